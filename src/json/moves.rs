@@ -90,10 +90,16 @@ pub fn motion(done: &Moved) -> Value {
     let (word, time) = ending(run.outcome.ending, run.metrics.end);
     let geometry = done.machine.geometry();
     let names = geometry.slides.iter().map(|slide| geometry.label(slide.body).key);
-    let loads = names.zip(&figures.loads).zip(&done.motion.profiles).map(|((name, load), profile)| {
-        let told = json!({
+    // Of a stepper, commanded minus true position at the end.
+    let remaining = |number: usize| run.metrics.loads.get(number).and_then(|load| load.command_error);
+    let loads = names.zip(&figures.loads).zip(&done.motion.profiles).enumerate();
+    let loads = loads.map(|(number, ((name, load), profile))| {
+        let mut told = json!({
             "error": deviation(load.error), "overshoot_m": load.overshoot, "target_m": profile.target(),
         });
+        if let (Some(error), Some(told)) = (remaining(number), told.as_object_mut()) {
+            told.insert("remaining_error_m".into(), json!(error));
+        }
         (name.to_string(), told)
     });
     let lost = |number: usize| run.metrics.drives.get(number).and_then(|drive| drive.lost_steps);
@@ -133,6 +139,9 @@ pub fn motion(done: &Moved) -> Value {
         object.insert("cart_error".into(), deviation(cart.error));
         object.insert("overshoot_m".into(), json!(cart.overshoot));
         object.extend(of_drive(drive, lost(0)));
+        if let Some(error) = remaining(0) {
+            object.insert("remaining_error_m".into(), json!(error));
+        }
     }
     if let Some(worst) = done.worst {
         object.insert(

@@ -1057,6 +1057,11 @@ pub(crate) const SMALLER: usize = 8;
 /// Unit: 1. Source: chosen. Test: `promises_hold_on_simulated_logs`.
 pub(crate) const START_OFF: f64 = 0.1;
 
+/// Error of the fits of simulated logs from which on the promise of a designed experiment is broken.
+///
+/// Unit: the promised standard error. Source: chosen. Test: `a_promise_that_fits_do_not_keep_is_reported`.
+pub(crate) const PROMISE_BROKEN: f64 = 2.0;
+
 /// Damped Gauss-Newton steps that rank the elements a model may lack.
 ///
 /// Unit: steps. Source: chosen: the price of a few runs. Test: `a_missing_spring_is_named`.
@@ -1291,6 +1296,16 @@ pub(crate) const MAP_WAVES: usize = 8;
 ///
 /// Unit: periods. Source: chosen: each half of the travel has to show one.
 pub(crate) const MAP_PERIODS: f64 = 2.0;
+
+/// Least amplitude of a sine of a map.
+///
+/// Unit: standard errors beside the other sines. Source: chosen. Test: `sines_that_cancel_are_not_named`.
+pub(crate) const MAP_ERRORS: f64 = 4.0;
+
+/// Most by which the error of a sine's amplitude grows beside the other sines of a map.
+///
+/// Unit: the error by itself. Source: chosen: beyond it two sines nearly cancel. Test: `sines_that_cancel_are_not_named`.
+pub(crate) const MAP_INFLATION: f64 = 3.0;
 
 /// Least amplitude of a periodic component in each half of the travel, relative to that in all of it.
 ///

@@ -25,6 +25,9 @@ const ROUNDING: f64 = 1e-6;
 /// The shortest run at an extreme value that may be a limit, samples.
 const CLIPPED: usize = 5;
 
+/// The way before an extreme is reached abruptly if it is so many times that of an even turn.
+const TURNS: f64 = 2.5;
+
 /// Share of all samples from which on held values are a suspicion, however few there are in a row.
 const HELD_MANY: f64 = 0.01;
 
@@ -300,7 +303,12 @@ impl Channel {
         };
         let at = |value: f64| {
             let (samples, first) = longest_run(values, |x| (x - value).abs() <= tolerance);
-            let abrupt = first > REACH && slope(first) > (0.3 * steepest).max(6.0 * count) && is_sudden(first);
+            // A turn with an even acceleration a stays n = 2 √(2 c/a)/h samples within a count c, and before that moves
+            // by a (n + 5)/2 · 5 h² = c (20/n + 100/n²) in five samples.
+            let n = samples as f64;
+            let turning = count * (20.0 / n + 100.0 / (n * n));
+            let least = (0.3 * steepest).max(6.0 * count).max(TURNS * turning);
+            let abrupt = first > REACH && slope(first) > least && is_sudden(first);
             (samples >= CLIPPED && abrupt).then(|| Clipped { value, at: time[first], samples })
         };
         [self.least, self.greatest].into_iter().filter_map(at).collect()

@@ -50,6 +50,8 @@ pub(super) struct Room {
     pub input: f64,
     /// Length, s.
     pub duration: f64,
+    /// Interval between samples, s: corners and steps lie on it, so that a log describes them exactly.
+    pub every: f64,
     /// Lowest and highest frequency, Hz.
     pub frequencies: [f64; 2],
 }
@@ -130,6 +132,11 @@ fn round(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }
 
+/// Rounds a time, s, to what is written of it.
+fn rounded(time: f64) -> f64 {
+    format!("{time:.9}").parse().unwrap_or(time)
+}
+
 /// Between two positive numbers, on a logarithmic scale.
 fn between(share: f64, low: f64, high: f64) -> f64 {
     low * (high / low).max(1.0).powf(share)
@@ -138,8 +145,10 @@ fn between(share: f64, low: f64, high: f64) -> f64 {
 impl Shape {
     /// Candidate of a kind at a point of the unit cube.
     pub(super) fn at(kind: Kind, share: &[f64], room: &Room) -> Self {
-        let &Room { input, duration, frequencies: [low, high] } = room;
-        let busy = duration * (1.0 - REST_AT_END);
+        let &Room { input, duration, every, frequencies: [low, high] } = room;
+        // A whole number of intervals.
+        let whole = |time: f64, least: f64| rounded(every * (time / every).round().max(least));
+        let busy = whole(duration * (1.0 - REST_AT_END), 1.0);
         let amplitude = round(between(share[0], 0.05 * input, input));
         let frequency = |share: f64| round(between(share, low, high));
         let apart = |a: f64, b: f64| if a < b { (a, b) } else { (b, round(a.max(b * 1.05))) };
@@ -148,8 +157,8 @@ impl Shape {
                 let cycles = between(share[1], 1.0, MOST_CYCLES).round();
                 let half = busy / (2.0 * cycles);
                 let (ramp, rest) = (0.45 * between(share[2], 0.002, 1.0), 0.6 * share[3]);
-                let [ramp, rest] = [round(ramp * half * (1.0 - rest)), round(rest * half)];
-                let hold = round(half - rest - 2.0 * ramp);
+                let [ramp, rest] = [whole(ramp * half * (1.0 - rest), 1.0), whole(rest * half, 0.0)];
+                let hold = whole(half - rest - 2.0 * ramp - 0.5 * every, 0.0);
                 let ratio = round(0.2 + 0.8 * share[4]);
                 Self::Trapezoid { amplitude, ramp, hold, rest, ratio, cycles: cycles as usize }
             }
@@ -159,19 +168,17 @@ impl Shape {
                 let each = round(busy / sines);
                 Self::Sweep { amplitude, from, to, sines: sines as usize, tilt: round(share[4]), each }
             }
-            Kind::Chirp => {
-                Self::Chirp { amplitude, from: frequency(share[1]), to: frequency(share[2]), over: round(busy) }
-            }
+            Kind::Chirp => Self::Chirp { amplitude, from: frequency(share[1]), to: frequency(share[2]), over: busy },
             Kind::Multisine => {
                 let (from, to) = apart(frequency(share[1]), frequency(share[2]));
                 let tones = between(share[3], 2.0, MULTISINE_TONES).round() as usize;
-                Self::Multisine { amplitude, from, to, tones, lasts: round(busy) }
+                Self::Multisine { amplitude, from, to, tones, lasts: busy }
             }
             Kind::Prbs => {
                 let least = (0.5 / high).max(duration / MOST_BITS);
-                let bit = round(between(share[1], least, 0.25 * duration));
+                let bit = whole(between(share[1], least, 0.25 * duration), 1.0);
                 let seed = 1 + (share[2] * 9.0).floor() as u64;
-                Self::Prbs { amplitude, bit, seed, lasts: round(busy) }
+                Self::Prbs { amplitude, bit, seed, lasts: busy }
             }
         }
     }
@@ -208,7 +215,7 @@ impl Shape {
             let value = if half % 2 == 0 { size } else { -size };
             for (takes, next) in [(ramp, value), (hold, value), (ramp, 0.0), (rest, 0.0)] {
                 if takes > 0.0 {
-                    t = format!("{:.6}", t + takes).parse().unwrap_or(t + takes);
+                    t = rounded(t + takes);
                     points.push([t, next]);
                 }
             }

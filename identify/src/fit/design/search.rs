@@ -193,7 +193,7 @@ fn nothing(task: &Task) -> Error {
 fn room(task: &Task) -> Room {
     let high = (OF_RATE / task.every).min(MOST_PERIODS / task.duration);
     let low = (1.0 / task.duration).min(0.5 * high);
-    Room { input: task.limits.input.0, duration: task.duration, frequencies: [low, high] }
+    Room { input: task.limits.input.0, duration: task.duration, every: task.every, frequencies: [low, high] }
 }
 
 /// Value of an input at a point of the unit cube.

@@ -98,9 +98,9 @@ impl Task<'_> {
             name: name.to_string(),
             file: Default::default(),
             inputs: inputs.iter().map(|input| time.iter().map(|&t| input.value(t)).collect()).collect(),
+            hold: hold(inputs, &time),
             time,
             added: None,
-            hold: Hold::Zero,
             reference: None,
             outputs: outputs.collect(),
             ended: None,
@@ -180,4 +180,19 @@ fn source(block: &Trajectory, quantity: Quantity) -> &[f64] {
 fn recorded(value: f64, channel: &Channel, random: &mut Pcg64) -> f64 {
     let noisy = if channel.noise > 0.0 { value + channel.noise * normal(random) } else { value };
     channel.step.map_or(noisy, |step| (noisy / step).round() * step)
+}
+
+/// What a log of inputs has to say of the time between its samples: that they are held where they switch, and a line
+/// otherwise, whichever is nearer in the middle.
+pub(super) fn hold(inputs: &[Signal], time: &[f64]) -> Hold {
+    let mut off = [0.0; 2];
+    for input in inputs {
+        for pair in time.windows(2) {
+            let [a, b] = [pair[0], pair[1]].map(|t| input.value(t));
+            let middle = input.value(0.5 * (pair[0] + pair[1]));
+            off[0] += (middle - a).abs();
+            off[1] += (middle - 0.5 * (a + b)).abs();
+        }
+    }
+    if off[1] < off[0] { Hold::Linear } else { Hold::Zero }
 }

@@ -7,7 +7,7 @@ use crate::chance::uniform;
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::Stop;
 use crate::fit::fit;
-use crate::fit::limits::START_OFF;
+use crate::fit::limits::{PROMISE_BROKEN, START_OFF};
 use crate::fit::search::point::Ending;
 use crate::log::Quantity;
 use crate::solve::Flow;
@@ -27,6 +27,16 @@ pub struct Verified {
     pub coverage: f64,
     /// Number of fits that determined it.
     pub fits: usize,
+}
+
+impl Verified {
+    /// RMS of estimate − truth relative to the promise, which includes the error of the model, if that is broken: the
+    /// fits end far from the truth, in other minima or with residuals that the promise does not know.
+    pub fn broken(&self, found: &Designed) -> Option<f64> {
+        let promise = found.promises.iter().find(|promise| promise.name == self.name && promise.wanted)?;
+        let times = self.ratio * promise.random / promise.error;
+        (times > PROMISE_BROKEN).then_some(times)
+    }
 }
 
 /// Simulates a log of a designed experiment on each of `logs` machines and fits it; returns the errors of the estimates

@@ -12,7 +12,8 @@
 //! P(> x) = (1 + x/(ν B))^(−ν B), and N wave numbers are tried.
 
 use crate::fit::limits::{
-    MAP_FALSE_ALARM, MAP_HALF, MAP_NEIGHBOURS, MAP_PERIODS, MAP_RASTER, MAP_ROUNDS, MAP_SECTIONS, MAP_WAVES,
+    MAP_ERRORS, MAP_FALSE_ALARM, MAP_HALF, MAP_INFLATION, MAP_NEIGHBOURS, MAP_PERIODS, MAP_RASTER, MAP_ROUNDS,
+    MAP_SECTIONS, MAP_WAVES,
 };
 use crate::fit::search::triangle::inverse_of_square;
 use crate::golden;
@@ -108,20 +109,28 @@ pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Found {
         let is_periodic = left
             .chunks(left.len().div_ceil(2))
             .all(|half| coefficient(half, number * noise.step).norm() > MAP_HALF * size);
+        let before = numbers.clone();
         numbers.push(number);
-        found.push((is_periodic, chance));
         refine(values, &mut numbers, noise.step, step);
+        // Sines that cancel each other are not in the force.
+        if errors(values, &numbers, noise.step).is_none_or(|all| all.iter().any(|own| own.inflation > MAP_INFLATION)) {
+            numbers = before;
+            break;
+        }
+        found.push((is_periodic, chance));
     }
     let amplitudes = without(values, &numbers, noise.step).map(|(_, amplitudes)| amplitudes).unwrap_or_default();
-    let wave = |((number, (is_periodic, chance)), amplitude): ((&f64, (bool, f64)), &f64)| {
-        let (number, amplitude) = (*number, *amplitude);
-        let variance = noise.at(number)[0] * noise.weight;
-        // σ_A² = S w/2, σ_ω² = 6 S w/(A L)²                            (Cramér-Rao bounds of a sine in white noise)
-        let error = (6.0 * variance).sqrt() / (2.0 * PI * amplitude * length);
-        let amplitude = [amplitude, (0.5 * variance).sqrt()];
-        is_periodic.then_some(Wave { number: [number, error], amplitude, chance })
+    let errors = errors(values, &numbers, noise.step).unwrap_or_default();
+    let wave = |(k, (is_periodic, chance)): (usize, (bool, f64))| {
+        // σ² = n S w/4 of each point
+        let deviation = (0.25 * noise.count() as f64 * noise.at(numbers[k])[0] * noise.weight).sqrt();
+        let own = errors.get(k)?;
+        let number = [numbers[k], deviation * own.number];
+        let amplitude = [amplitudes[k], deviation * own.amplitude];
+        let is_clear = amplitude[0] > MAP_ERRORS * amplitude[1];
+        (is_periodic && is_clear).then_some(Wave { number, amplitude, chance })
     };
-    let mut waves: Vec<Wave> = numbers.iter().zip(found).zip(&amplitudes).filter_map(wave).collect();
+    let mut waves: Vec<Wave> = found.into_iter().enumerate().filter_map(wave).collect();
     waves.sort_by(|a, b| b.amplitude[0].total_cmp(&a.amplitude[0]));
     let needed = |f: &f64| {
         let [power, freedom] = noise.at(*f);
@@ -155,19 +164,63 @@ fn coefficient(values: &[f64], number: f64) -> Complex<f64> {
     sum * (2.0 / values.len() as f64)
 }
 
-/// Residuals of a least-squares fit of a cubic and sines with these wave numbers, and the amplitudes of the sines.
-fn without(values: &[f64], numbers: &[f64], step: f64) -> Option<(Vec<f64>, Vec<f64>)> {
-    let n = values.len();
-    let matrix = DMatrix::from_fn(n, 4 + 2 * numbers.len(), |j, column| match column {
+/// The terms of a cubic and sines with these wave numbers at `n` points.
+fn terms(n: usize, numbers: &[f64], step: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(n, 4 + 2 * numbers.len(), |j, column| match column {
         0..4 => (2.0 * j as f64 / (n - 1) as f64 - 1.0).powi(column as i32),
         _ => {
             let angle = 2.0 * PI * numbers[(column - 4) / 2] * step * j as f64;
             if column % 2 == 0 { angle.cos() } else { angle.sin() }
         }
-    });
+    })
+}
+
+/// Residuals of a least-squares fit of a cubic and sines with these wave numbers, and the amplitudes of the sines.
+fn without(values: &[f64], numbers: &[f64], step: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+    let matrix = terms(values.len(), numbers, step);
     let values = DVector::from_column_slice(values);
     let found = inverse_of_square(&matrix)? * matrix.tr_mul(&values);
     let left = values - &matrix * &found;
     let amplitudes = (0..numbers.len()).map(|k| found[4 + 2 * k].hypot(found[5 + 2 * k])).collect();
     Some((left.as_slice().to_vec(), amplitudes))
+}
+
+/// Errors of one of several sines with a cubic, for points with a standard deviation of 1.
+struct Errors {
+    /// Standard error of the wave number, 1/m.
+    number: f64,
+    /// Standard error of the amplitude.
+    amplitude: f64,
+    /// Ratio of that to √(2/n) of a sine by itself.
+    inflation: f64,
+}
+
+/// The errors of all sines together: (JᵀJ)⁻¹ with the derivatives by the coefficients of the cubic, a and b of each
+/// a cos 2πfx + b sin 2πfx, and f.
+fn errors(values: &[f64], numbers: &[f64], step: f64) -> Option<Vec<Errors>> {
+    let n = values.len();
+    let linear = terms(n, numbers, step);
+    let found = inverse_of_square(&linear)? * linear.tr_mul(&DVector::from_column_slice(values));
+    let pair = |k: usize| [found[4 + 2 * k], found[5 + 2 * k]];
+    let first = linear.ncols();
+    let mut whole = linear.resize_horizontally(first + numbers.len(), 0.0);
+    for k in 0..numbers.len() {
+        let [a, b] = pair(k);
+        for j in 0..n {
+            let x = step * j as f64;
+            let (sin, cos) = (2.0 * PI * numbers[k] * x).sin_cos();
+            whole[(j, first + k)] = 2.0 * PI * x * (b * cos - a * sin);
+        }
+    }
+    let inverse = inverse_of_square(&whole)?;
+    let of = |k: usize| {
+        let ([a, b], i) = (pair(k), 4 + 2 * k);
+        let size = a.hypot(b).max(f64::MIN_POSITIVE);
+        let (a, b) = (a / size, b / size);
+        let square = a * a * inverse[(i, i)] + 2.0 * a * b * inverse[(i, i + 1)] + b * b * inverse[(i + 1, i + 1)];
+        let amplitude = square.max(0.0).sqrt();
+        let number = inverse[(first + k, first + k)].max(0.0).sqrt();
+        Errors { number, amplitude, inflation: amplitude / (2.0 / n as f64).sqrt() }
+    };
+    Some((0..numbers.len()).map(of).collect())
 }
