@@ -146,8 +146,8 @@ fn sines_that_cancel_are_not_named() {
         let short = 0.019 + 0.008 * uniform(&mut random);
         let turn = 2.0 * PI * plain.machine.pulley_radius;
         let at = |x: f64| 0.6 * (2.0 * PI * x / turn + one).sin() + 0.45 * (2.0 * PI * x / short + two).sin();
-        let point = |k: usize| (k as f64 / 199.0) * 0.32 - 0.01;
-        let points: Vec<String> = (0..200).map(|k| format!("[{}, {}]", point(k), at(point(k)))).collect();
+        let point = |k: usize| (k as f64 / 99.0) * 0.32 - 0.01;
+        let points: Vec<String> = (0..100).map(|k| format!("[{}, {}]", point(k), at(point(k)))).collect();
         let found = learned(&plain, &case(&[&format!("cart.force_along=[{}]", points.join(", "))]), seed as u64);
         for one in &found.components {
             let period = one.period[0];
