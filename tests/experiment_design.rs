@@ -67,7 +67,8 @@ fn a_promise_that_fits_do_not_keep_is_reported() {
         let times = one.ratio * promise.random / promise.error;
         assert_eq!(one.broken(&found), (times > 2.0).then_some(times), "{one:?}");
     }
-    let whole = |time: f64| (time / request.every.unwrap_or(1e-3) - (time / request.every.unwrap_or(1e-3)).round()).abs();
+    let whole =
+        |time: f64| (time / request.every.unwrap_or(1e-3) - (time / request.every.unwrap_or(1e-3)).round()).abs();
     let Shape::Prbs { bit, lasts, .. } = found.shape else { panic!("{:?}", found.shape) };
     assert!(whole(bit) < 1e-6 && whole(lasts) < 1e-6, "{bit} s, {lasts} s");
 }

@@ -408,6 +408,14 @@ fn moves_that_cannot_be() {
     let output = taut_in(folder.path()).arg("move").arg(table4()).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(text(&output.stderr).contains("no move and no controller"), "{}", text(&output.stderr));
+    // With the controller that this proposes, only the move is missing.
+    let with_controller = std::fs::read_to_string(&case).unwrap().replace("[[move]]", "[[ignored]]");
+    let with_controller = with_controller.split("[[ignored]]").next().unwrap();
+    std::fs::write(folder.path().join("still.toml"), with_controller).unwrap();
+    let output = taut_in(folder.path()).args(["move", "still.toml"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    let told = text(&output.stderr);
+    assert!(told.contains("this case has no move") && !told.contains("[controller]"), "{told}");
     let output = taut_in(folder.path()).arg("move").arg(&case).args(["--spread", "150%"]).output().unwrap();
     assert_eq!(output.status.code(), Some(2));
 }

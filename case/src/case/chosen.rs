@@ -58,7 +58,7 @@ impl Case {
     /// own.
     pub fn moves_named(&self, path: &Path, names: &[String]) -> Result<(&Design, Vec<&Move>)> {
         let Some(design) = self.controller.as_ref().filter(|_| !self.moves.is_empty()) else {
-            if self.machine.stepper().is_some() {
+            if self.machine.stepper().is_some() || self.controller.is_some() {
                 return Err(Error::new("this case has no move")
                     .in_file(path)
                     .next("add [[move]] with name, to, speed, acceleration and until"));
