@@ -41,19 +41,24 @@ fn a_plan_is_written_and_moves() {
 
 #[test]
 fn what_cannot_be_planned_is_told() {
-    let cases: [(&[&str], i32, &str); 9] = [
+    let cases: [(&[&str], i32, &str); 10] = [
         (&["stages/sollmann-jouaneh/table4.toml"], 2, "move"),
         (&[PID, "--move", "gone"], 2, "gone"),
         (&[PID, "--reserve", "95%"], 2, "a share from 0 to 90% is needed"),
         (&[PID, "--speed", "0"], 2, "speed above zero"),
         (&[PID, "--jerk", "5 m/s"], 2, "m/s^3"),
         (&[PID, "--move", "long", "--set", "cart.friction.static=1 kN"], 1, "breakaway requires"),
+        (
+            &[PID, "--move", "long", "--set", "cart.friction.static=1 kN", "--set", "cart.friction.coulomb=1 kN"],
+            1,
+            "there is no plan: breakaway requires",
+        ),
         (&[PID, "--move", "long", "--set", "controller.limit=0.5 V"], 1, "there is no plan"),
         (&["stages/core-xy/core-xy.toml"], 2, "no move and no controller"),
         (
             &["stages/core-xy/square.toml", "--move", "square", "--set", "controller.limit=0.1 V"],
             1,
-            "there is no plan: left drive: ",
+            "there is no plan: bridge: breakaway requires",
         ),
     ];
     for (plan, besides, part) in [

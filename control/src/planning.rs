@@ -7,8 +7,9 @@ use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
-use crate::reach::feasible::{Load, Shortfall, limits, loads};
-use crate::reach::quickest::{CLOSELY, INSTANTS, Quickest, Wanted, Way, modes};
+use crate::metrics::Peak;
+use crate::reach::feasible::{Load, Shortfall, limits, loads, loads_of_run, shortfalls_of_run};
+use crate::reach::quickest::{CLOSELY, INSTANTS, Quickest, Share, Wanted, Way, modes};
 use crate::signal::profile::{Leg, Limits, Profile};
 use crate::solve::{Ending, Solver};
 use crate::tune::Family;
@@ -19,6 +20,14 @@ const PERIODS: [[u8; 2]; 5] = [[0, 0], [1, 0], [2, 0], [3, 0], [1, 1]];
 
 /// Fractions of the limits that plans use, the quickest first.
 const SHARES: [f64; 8] = [1.0, 0.85, 0.72, 0.6, 0.5, 0.4, 0.3, 0.2];
+
+/// Maximum number of times that a plan is slowed down because its run exceeds a limit of the belt, and the fraction of
+/// the limit that the next one aims at.
+const SLOWED: usize = 5;
+const AIMED: f64 = 0.98;
+
+/// Use of a limit from which a reference is evaluated closely.
+const NEAR: f64 = 0.8;
 
 /// Shortest observed time at rest, s, and a time longer than any move, s.
 const WATCHED: f64 = 0.3;
@@ -72,11 +81,12 @@ pub struct Planned {
     pub is_kept: bool,
     /// Arrival with the limits of the file.
     pub given: Arrival,
-    /// Limits that the move of the file exceeds.
+    /// Limits that the move of the file exceeds, and those of the belt that its run exceeds.
     pub shortfalls: Vec<Shortfall>,
     /// The references of the file.
     pub references: Vec<Profile>,
-    /// Use of each limit of the machine, worst case over the family.
+    /// Use of each limit of the machine, worst case over the references on the family and the run on the machine of the
+    /// file.
     pub loads: Vec<Load>,
     /// Minimum time of the rigid axis within voltage and current, s; none if nothing limits it, or with several drives.
     pub bound: Option<f64>,
@@ -150,6 +160,31 @@ fn smooth(machine: &Machine) -> Machine {
     smooth
 }
 
+/// The machine with spans that can also push, which shows by how much a slack span lacks tension.
+fn two_sided(machine: &Machine) -> Machine {
+    let mut machine = machine.clone();
+    machine.belt.pretension = None;
+    machine
+}
+
+/// What a run has shown.
+struct Ran {
+    /// Time of arrival of the cart, s.
+    arrives: Option<f64>,
+    /// Largest error of a sliding part, m.
+    error: f64,
+    /// Least and greatest force in each span relative to the pretension, N; none for several drives, whose belts are
+    /// not limited.
+    spans: Vec<[Peak; 2]>,
+}
+
+/// The path of a move and its quickest way.
+struct Search<'a> {
+    quickest: Quickest<'a>,
+    way: Way,
+    motion: &'a Move,
+}
+
 /// Data shared by the plans of a case.
 struct Planner<'a> {
     design: &'a Design,
@@ -166,41 +201,51 @@ impl Planner<'_> {
         let impossible = |what: String| Error::new(format!("the move \"{}\": there is no plan: {what}", motion.name));
         let way = Way::of(&motion.profiles).ok_or_else(|| impossible("it has no stroke".into()))?;
         let machine = &self.family.machine;
-        let short = motion.shortfalls(machine, self.design);
+        let mut short = motion.shortfalls(machine, self.design);
         let quickest = Quickest { machine, design: self.design, modes: self.modes, wanted: self.wanted };
         quickest
             .check(&way)
             .map_err(|error| Error { what: format!("the move \"{}\": {}", motion.name, error.what), ..error })?;
-        let mut tried = self.tried(&quickest, &way, motion)?;
+        let search = Search { quickest, way, motion };
+        let (mut tried, refused) = self.tried(&search)?;
         if tried.is_empty() {
-            return Err(impossible("after the reserve, voltage and current accelerate no axis of the family".into()));
+            return Err(impossible(match refused {
+                Some(short) => short.words,
+                None => "after the reserve, the limits of motor and belt leave none on all axes of the family".into(),
+            }));
         }
-        tried.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
-        let (mut best, mut slowest, mut is_run) = (tried[0].clone(), None, false);
-        for one in &mut tried {
-            // The slowest machine of a family does not arrive before any of its members.
-            if (self.stop)() || is_run && best.rank() <= one.rank() {
-                break;
-            }
-            let late;
-            (one.arrival, late) = self.of_family(motion, &way.within(&one.limits)?, &one.arrival)?;
-            if !is_run || one.rank() < best.rank() {
-                (best, slowest, is_run) = (one.clone(), late, true);
-            }
+        let (mut best, slowest) = self.best(&search, &mut tried)?;
+        let mut profiles = search.way.within(&best.limits)?;
+        let mut ran;
+        (best.arrival, ran) = self.finished(motion, &profiles, best.arrival, slowest)?;
+        // A stepper's microsteps shake the belt more than the search has shown.
+        if !self.beyond(&profiles, &ran).is_empty() && !(self.stop)() {
+            (best.limits, _) = self
+                .slowed(&search, best.periods, best.share, best.limits, machine)?
+                .map_err(|short| impossible(short.words))?;
+            profiles = search.way.within(&best.limits)?;
+            let (arrival, slowest) = self.of_family(motion, &profiles, &best.arrival)?;
+            (best.arrival, ran) = self.finished(
+                motion,
+                &profiles,
+                Arrival { duration: Profile::last_end(&profiles), ..arrival },
+                slowest,
+            )?;
         }
-        let profiles = way.within(&best.limits)?;
-        best.arrival = self.in_microsteps(motion, &profiles, best.arrival, slowest)?;
         let given = self.arrival(motion, &motion.profiles)?;
         let (given, slowest) = self.of_family(motion, &motion.profiles, &given)?;
-        let given = self.in_microsteps(motion, &motion.profiles, given, slowest)?;
+        let (given, ran_given) = self.finished(motion, &motion.profiles, given, slowest)?;
+        short.extend(self.beyond(&motion.profiles, &ran_given));
         let is_sooner = short.is_empty() && Tried::rank_of(&given) <= best.rank();
+        let mut loads = self.loads(&self.design.shaped(&profiles), |_| CLOSELY);
+        loads_of_run(machine, &ran.spans).into_iter().for_each(|load| load.join(&mut loads));
         Ok(Planned {
             is_kept: is_sooner,
             place,
             name: motion.name.clone(),
             window: motion.window,
-            loads: self.loads(&self.design.shaped(&profiles), CLOSELY),
-            bound: self.bound(&way),
+            loads,
+            bound: self.bound(&search.way),
             given,
             references: motion.profiles.clone(),
             shortfalls: short,
@@ -210,37 +255,118 @@ impl Planner<'_> {
         })
     }
 
-    /// Plans for each jerk time and fraction of the limits, with their arrival on the nominal machine.
-    fn tried(&self, quickest: &Quickest, way: &Way, motion: &Move) -> Result<Vec<Tried>> {
-        let mut tried = Vec::new();
+    /// Plans for each jerk time and fraction of the limits, with their arrival on the nominal machine, and what a run
+    /// exceeded for which there is none.
+    fn tried(&self, search: &Search) -> Result<(Vec<Tried>, Option<Shortfall>)> {
+        let (mut tried, mut refused) = (Vec::new(), None);
+        let machine = smooth(&self.family.machine);
         for periods in PERIODS {
+            let mut seen: Vec<Limits> = Vec::new();
             for share in SHARES {
                 if (self.stop)() {
-                    return Ok(tried);
+                    return Ok((tried, refused));
                 }
-                let all =
-                    |profiles: &[Profile]| self.loads(profiles, INSTANTS).iter().map(Load::share).fold(0.0, f64::max);
-                let Some(limits) = quickest.limits_for(way, periods, share, &all)? else { continue };
-                let arrival = self.arrival(motion, &way.within(&limits)?)?;
-                tried.push(Tried { limits, periods, share, arrival });
+                let within = Share { motor: share, ..Share::ALL };
+                let Some(limits) = self.limits(search, periods, within)? else { continue };
+                // Where the belt is the limit, a smaller share of the motor's changes nothing.
+                if seen.contains(&limits) {
+                    continue;
+                }
+                seen.push(limits);
+                match self.slowed(search, periods, share, limits, &machine)? {
+                    Ok((limits, ran)) => {
+                        let duration = Profile::last_end(&search.way.within(&limits)?);
+                        tried.push(Tried { limits, periods, share, arrival: Arrival::of(duration, &ran) });
+                    }
+                    Err(short) => refused = Some(short),
+                }
             }
         }
-        Ok(tried)
+        Ok((tried, refused))
     }
 
-    /// Largest use of each limit by references with their shaper, over the family.
-    fn loads(&self, profiles: &[Profile], instants: usize) -> Vec<Load> {
+    /// Limits of the quickest move within these fractions of the limits, and within those of the family.
+    fn limits(&self, search: &Search, periods: [u8; 2], share: Share) -> Result<Option<Limits>> {
+        let closely = |near: &[Load]| if near.iter().any(|load| load.share() > NEAR) { CLOSELY } else { INSTANTS };
+        search.quickest.limits_for(&search.way, periods, share, &|profiles| self.loads(profiles, closely))
+    }
+
+    /// The limits of a plan, reduced until its run on this machine keeps the limits of the belt, and that run; or what
+    /// it exceeds. The belt vibrates, so that its spans take more than the reference requires.
+    fn slowed(
+        &self,
+        search: &Search,
+        periods: [u8; 2],
+        motor: f64,
+        mut limits: Limits,
+        machine: &Machine,
+    ) -> Result<std::result::Result<(Limits, Ran), Shortfall>> {
+        let of_belt =
+            |loads: &[Load]| loads.iter().filter(|load| !load.is_of_motor()).map(Load::share).fold(0.0, f64::max);
+        let (mut belt, mut slowed) = (1.0, 0);
+        loop {
+            let profiles = search.way.within(&limits)?;
+            let ran = self.run(search.motion, &profiles, machine)?;
+            let Some(short) = self.beyond(&profiles, &ran).into_iter().next() else { return Ok(Ok((limits, ran))) };
+            if slowed == SLOWED {
+                return Ok(Err(short));
+            }
+            slowed += 1;
+            let shaped = self.design.shaped(&profiles);
+            let required = of_belt(&loads(&self.family.machine, self.design.limit, &shaped, INSTANTS));
+            let taken = self.run(search.motion, &profiles, &two_sided(machine))?;
+            belt = AIMED * required.min(belt) / of_belt(&loads_of_run(&self.family.machine, &taken.spans)).max(1.0);
+            limits = match self.limits(search, periods, Share { motor, belt })? {
+                Some(limits) => limits,
+                None => return Ok(Err(short)),
+            };
+        }
+    }
+
+    /// The limits of the belt of the file that a run exceeds.
+    fn beyond(&self, profiles: &[Profile], ran: &Ran) -> Vec<Shortfall> {
+        match &self.design.shaped(profiles)[..] {
+            [profile] => shortfalls_of_run(&self.family.machine, &ran.spans, profile),
+            _ => Vec::new(),
+        }
+    }
+
+    /// The best of the plans on the whole family, and its slowest machine.
+    fn best(&self, search: &Search, tried: &mut [Tried]) -> Result<(Tried, Option<&Machine>)> {
+        tried.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
+        let (mut best, mut slowest, mut is_run) = (tried[0].clone(), None, false);
+        for one in tried {
+            // The slowest machine of a family does not arrive before any of its members.
+            if (self.stop)() || is_run && best.rank() <= one.rank() {
+                break;
+            }
+            let late;
+            (one.arrival, late) = self.of_family(search.motion, &search.way.within(&one.limits)?, &one.arrival)?;
+            if !is_run || one.rank() < best.rank() {
+                (best, slowest, is_run) = (one.clone(), late, true);
+            }
+        }
+        Ok((best, slowest))
+    }
+
+    /// Largest use of each limit by references with their shaper, over the family, at `closely` of the loads at a few
+    /// instants.
+    fn loads(&self, profiles: &[Profile], closely: impl Fn(&[Load]) -> usize) -> Vec<Load> {
         let mut all: Vec<Load> = Vec::new();
         for (machine, _) in &self.machines {
-            let own = loads(machine, self.design.limit, profiles, instants);
+            let at = |instants: usize| loads(machine, self.design.limit, profiles, instants);
+            let few = at(INSTANTS);
+            let own = match closely(&few) {
+                INSTANTS => few,
+                instants => at(instants),
+            };
             own.into_iter().for_each(|load| load.join(&mut all));
         }
         all
     }
 
-    /// Time of arrival of the cart, s, and the largest error of a sliding part, m: in closed loop, or as steppers take
-    /// it there.
-    fn run(&self, motion: &Move, profiles: &[Profile], machine: &Machine) -> Result<(Option<f64>, f64)> {
+    /// A run in closed loop, or as steppers take the cart along the references.
+    fn run(&self, motion: &Move, profiles: &[Profile], machine: &Machine) -> Result<Ran> {
         let watched = (motion.until - motion.end()).max(WATCHED);
         let run = closed_loop(&Setup {
             machine,
@@ -252,21 +378,17 @@ impl Planner<'_> {
             solver: Solver::of(machine),
         })?;
         let settling = run.figures.settling.filter(|_| run.outcome.ending == Ending::Complete);
-        let error = run.figures.worst_load().error.peak.value.abs();
-        Ok((settling.map(|settling| Profile::last_end(profiles) + settling), error))
+        Ok(Ran {
+            arrives: settling.map(|settling| Profile::last_end(profiles) + settling),
+            error: run.figures.worst_load().error.peak.value.abs(),
+            spans: if machine.drives.len() == 1 { run.figures.spans } else { Vec::new() },
+        })
     }
 
     /// Arrival on the machine of the file alone.
     fn arrival(&self, motion: &Move, profiles: &[Profile]) -> Result<Arrival> {
-        let (nominal, cart_error) = self.run(motion, profiles, &smooth(&self.family.machine))?;
-        Ok(Arrival {
-            duration: Profile::last_end(profiles),
-            nominal,
-            worst: None,
-            settled: usize::from(nominal.is_some()),
-            axes: 1,
-            cart_error,
-        })
+        let ran = self.run(motion, profiles, &smooth(&self.family.machine))?;
+        Ok(Arrival::of(Profile::last_end(profiles), &ran))
     }
 
     /// The same with the whole family, and the machine that arrives last.
@@ -277,7 +399,7 @@ impl Planner<'_> {
             if (self.stop)() {
                 return Ok((arrival, None));
             }
-            let (time, _) = self.run(motion, profiles, &smooth(machine))?;
+            let time = self.run(motion, profiles, &smooth(machine))?.arrives;
             arrival.settled += if time.is_some() { *count } else { 0 };
             arrival.axes += count;
             let late = time.unwrap_or(f64::INFINITY);
@@ -289,23 +411,22 @@ impl Planner<'_> {
         Ok((arrival, slowest.map(|(_, machine)| machine)))
     }
 
-    /// The same where steppers move the machine of the file and the slowest one in microsteps.
-    fn in_microsteps(
+    /// The same with the run on the machine of the file; steppers move it and the slowest one in microsteps.
+    fn finished(
         &self,
         motion: &Move,
         profiles: &[Profile],
         mut arrival: Arrival,
         slowest: Option<&Machine>,
-    ) -> Result<Arrival> {
-        if !self.family.machine.mechanism().is_stepped() {
-            return Ok(arrival);
+    ) -> Result<(Arrival, Ran)> {
+        let ran = self.run(motion, profiles, &self.family.machine)?;
+        (arrival.nominal, arrival.cart_error) = (ran.arrives, ran.error);
+        if let (true, Some(worst), Some(machine)) =
+            (self.family.machine.mechanism().is_stepped(), arrival.worst, slowest)
+        {
+            arrival.worst = self.run(motion, profiles, machine)?.arrives.map(|stepped| worst.max(stepped));
         }
-        (arrival.nominal, arrival.cart_error) = self.run(motion, profiles, &self.family.machine)?;
-        if let (Some(worst), Some(machine)) = (arrival.worst, slowest) {
-            let (stepped, _) = self.run(motion, profiles, machine)?;
-            arrival.worst = stepped.map(|stepped| worst.max(stepped));
-        }
-        Ok(arrival)
+        Ok((arrival, ran))
     }
 
     /// Minimum time of all legs of the rigid axis, with their rests.
@@ -325,6 +446,20 @@ impl Planner<'_> {
             }
         }
         Some(time)
+    }
+}
+
+impl Arrival {
+    /// That of a run on the machine of the file alone.
+    fn of(duration: f64, ran: &Ran) -> Self {
+        Self {
+            duration,
+            nominal: ran.arrives,
+            worst: None,
+            settled: usize::from(ran.arrives.is_some()),
+            axes: 1,
+            cart_error: ran.error,
+        }
     }
 }
 

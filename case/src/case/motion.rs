@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::quantity::{rounded, show};
 use crate::reach::feasible::{Shortfall, shortfalls};
-use crate::reach::quickest::{Quickest, Wanted, Way, modes};
+use crate::reach::quickest::{Quickest, Share, Wanted, Way, modes};
 use crate::signal::arc::Arc;
 use crate::signal::gcode;
 use crate::signal::profile::{Leg, Limits, Passage, Profile};
@@ -197,7 +197,7 @@ fn planned(table: &Table, field: &Field, from: &[f64], machine: &Machine, design
     let quickest = Quickest { machine, design, modes: &modes, wanted: &wanted };
     quickest.check(&way).map_err(told)?;
     for periods in [[1, 1], [1, 0], [0, 0]] {
-        if let Some(limits) = quickest.limits_for(&way, periods, 1.0, &|_| 0.0).map_err(told)? {
+        if let Some(limits) = quickest.limits_for(&way, periods, Share::ALL, &|_| Vec::new()).map_err(told)? {
             return Ok(limits);
         }
     }

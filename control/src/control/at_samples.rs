@@ -146,6 +146,7 @@ impl<'a> Gathered<'a> {
             loads: self.slides.iter().map(load).collect(),
             settling: is_inside.then(|| entered.map_or(0.0, |time| (time - self.done).max(0.0))),
             drives: self.currents.iter().map(drive).collect(),
+            spans: Vec::new(),
             contour: None,
         }
     }

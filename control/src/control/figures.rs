@@ -33,6 +33,8 @@ pub struct Figures {
     pub loads: Vec<LoadFigures>,
     /// Figures of the drives.
     pub drives: Vec<DriveFigures>,
+    /// Least and greatest force in each span relative to the pretension, N; none for a rigid belt.
+    pub spans: Vec<[Peak; 2]>,
     /// Contour error of a machine with two coordinates, positive to the left of the path. Exact while the nearest leg
     /// does not change; near corners its peak is searched among nine points of each piece of the motion.
     pub contour: Option<Deviation>,

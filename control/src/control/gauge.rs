@@ -25,6 +25,7 @@ pub(super) struct Gauge<'a> {
     window: f64,
     loads: Vec<LoadGauge>,
     drives: Vec<DriveGauge>,
+    spans: Vec<SpanGauge>,
     contour: Option<ContourGauge>,
     end: f64,
     /// True if only the errors of the slides, settling and current are required.
@@ -67,6 +68,13 @@ struct DriveGauge {
     /// True if a limit of its amplifier is active now.
     saturated: bool,
     seen: DriveFigures,
+}
+
+/// Least and greatest force in a span, gathered during a run.
+struct SpanGauge {
+    /// The reading of its force.
+    force: usize,
+    seen: [Peak; 2],
 }
 
 /// The voltage at a motor's terminals.
@@ -149,6 +157,40 @@ impl LoadGauge {
     }
 }
 
+impl SpanGauge {
+    fn of(machine: &Machine, mechanism: &Mechanism) -> Vec<Self> {
+        let find = |span: usize| {
+            let wanted = Shown::Force(machine.span_alike(span)?, 1.0);
+            mechanism.readings.iter().position(|reading| *reading == wanted)
+        };
+        let spans = 0..machine.geometry().spans.len();
+        spans.filter_map(find).map(|force| Self { force, seen: [Peak::default(); 2] }).collect()
+    }
+
+    fn take(&mut self, value: f64, time: f64) {
+        let [least, greatest] = &mut self.seen;
+        if value < least.value {
+            *least = Peak { value, time };
+        }
+        if value > greatest.value {
+            *greatest = Peak { value, time };
+        }
+    }
+
+    fn see(&mut self, curve: &Curve) {
+        let force = curve.of(self.force);
+        let (low, high) = force.range();
+        if low < self.seen[0].value {
+            let (s, value) = force.negative().greatest(0.0, 1.0);
+            self.take(-value, curve.begin + s * curve.length);
+        }
+        if high > self.seen[1].value {
+            let (s, value) = force.greatest(0.0, 1.0);
+            self.take(value, curve.begin + s * curve.length);
+        }
+    }
+}
+
 impl DriveGauge {
     fn new(machine: &Machine, mechanism: &Mechanism, drive: usize) -> Self {
         let find = |shown: Shown| mechanism.readings.iter().position(|reading| *reading == shown);
@@ -220,6 +262,7 @@ impl<'a> Gauge<'a> {
             window,
             loads: loads.map(|load| LoadGauge::new(load, &mechanism)).collect(),
             drives: (0..machine.drives.len()).map(|drive| DriveGauge::new(machine, &mechanism, drive)).collect(),
+            spans: SpanGauge::of(machine, &mechanism),
             contour: Contour::along(profiles).map(ContourGauge::new),
             end: 0.0,
             is_brief: false,
@@ -287,6 +330,7 @@ impl<'a> Gauge<'a> {
                 Some(last) => Some(last - end),
             },
             contour: self.contour.map(|contour| contour.finish(self.end)),
+            spans: self.spans.iter().map(|span| span.seen).collect(),
             loads: self
                 .loads
                 .into_iter()
@@ -316,6 +360,10 @@ impl Observe for Gauge<'_> {
             return true;
         }
         self.meter.pass(gap);
+        for span in &mut self.spans {
+            span.take(gap.from[span.force], gap.begin);
+            span.take(gap.to[span.force], gap.begin + gap.length);
+        }
         for (number, drive) in self.drives.iter_mut().enumerate() {
             let mode = &gap.mode.drive[number];
             drive.saturated = mode.voltage != Limit::Inside || mode.current != Limit::Inside;
@@ -338,6 +386,7 @@ impl Observe for Gauge<'_> {
     fn see(&mut self, curve: &Curve) {
         if !self.is_brief {
             self.meter.see(curve);
+            self.spans.iter_mut().for_each(|span| span.see(curve));
         }
         for drive in &mut self.drives {
             drive.power(curve, self.is_brief);

@@ -69,7 +69,7 @@ pub struct Trouble {
 /// The problem of a run move, if any.
 pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move) -> Option<Trouble> {
     if machine.stepper().is_some() {
-        return lost_steps(machine, run);
+        return lost_steps(machine, design, run, motion);
     }
     let targets: Vec<f64> = motion.profiles.iter().map(Profile::target).collect();
     let at = Operation::at(&targets);
@@ -105,7 +105,7 @@ pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move)
 }
 
 /// Steps that steppers lost, if any did.
-fn lost_steps(machine: &Machine, run: &MoveRun) -> Option<Trouble> {
+fn lost_steps(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move) -> Option<Trouble> {
     let drives = machine.geometry().drives.iter().zip(&run.metrics.drives);
     let of_drive = |(at, drive): (&DriveAt, &OfDrive)| {
         let (lost, first) = drive.lost_steps.and_then(|lost| Some((lost.at_end, lost.first_slip?)))?;
@@ -116,9 +116,17 @@ fn lost_steps(machine: &Machine, run: &MoveRun) -> Option<Trouble> {
         ))
     };
     let lost: Vec<String> = drives.filter_map(of_drive).collect();
-    let cause = "its torque does not suffice for this speed and acceleration: `taut plan` finds what does".to_string();
+    if lost.is_empty() {
+        return None;
+    }
+    // No plan of a move breaks the load away with less.
+    let is_held = motion.shortfalls(machine, design).iter().any(|short| short.limit == "breakaway");
+    let cause = match is_held {
+        true => "its torque does not break the load away, however slow the move: a stronger motor, or less friction",
+        false => "its torque does not suffice for this speed and acceleration: `taut plan` finds what does",
+    };
     let words = format!("{}: {cause}", lost.join(", and "));
-    (!lost.is_empty()).then_some(Trouble { kind: Kind::LostSteps, frequency: None, words, cause })
+    Some(Trouble { kind: Kind::LostSteps, frequency: None, words, cause: cause.into() })
 }
 
 /// Frequency of oscillation of an unstable sampled loop, Hz; none also for nonlinear structures.

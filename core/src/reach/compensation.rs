@@ -51,7 +51,7 @@ pub struct Needed<N = f64> {
     pub idler: [N; 2],
     /// N; and its rate, N/s.
     pub force: [N; 2],
-    /// Forces in the three spans of an elastic belt relative to the pretension, N; zero for other belts.
+    /// Forces in the three spans relative to the pretension, N; zero for a rigid belt, of which none is known.
     pub spans: [N; 3],
 }
 
@@ -141,10 +141,14 @@ impl Compensation {
         let own = (machine.drive_pulley.inertia + n * n * machine.drives[0].motor.rotor_inertia) / (r * r);
         let force = drive.acceleration * own + drive_b * drive.speed + drive_c * sign / r + load[0] + pull[0];
         let rate = jerk * own + drive_b * drive.acceleration + load[1] + pull[1];
-        // f₁ = k₁ (y₁ − y),  f₂ = k₂ (y − y₃),  f₃ = k₃ (y₃ − y₁)
+        // f₁ = k₁ (y₁ − y),  f₂ = k₂ (y − y₃),  f₃ = k₃ (y₃ − y₁);  in series f₂ = f₃ = k₂ k₃/(k₂ + k₃) (y − y₁)
         let spans = match machine.belt.model {
             BeltModel::Elastic => [k1 * stretch[0], -k2 * behind[0], k3 * (behind[0] - stretch[0])],
-            BeltModel::TwoMass | BeltModel::Rigid => [c.number(0.0); 3],
+            BeltModel::TwoMass => {
+                let in_series = -(share * k3 * stretch[0]);
+                [k1 * stretch[0], in_series, in_series]
+            }
+            BeltModel::Rigid => [c.number(0.0); 3],
         };
         let force = [c.name("push", force), c.name("push_rate", rate)];
         Needed { drive, idler: [position + behind[0], speed + behind[1]], force, spans }

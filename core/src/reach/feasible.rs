@@ -5,12 +5,16 @@ use super::forward::Forward;
 use super::pull_out::Curve;
 use crate::design::{FeedForward, FeedForwardModel};
 use crate::machine::rigid::Rigid;
-use crate::machine::{AmplifierMode, Machine};
+use crate::machine::{AmplifierMode, Belt, BeltModel, Machine};
+use crate::metrics::Peak;
 use crate::number::engineering;
 use crate::signal::profile::{Profile, Reference};
 
 /// Number of instants at which a reference is evaluated.
 const INSTANTS: usize = 4000;
+
+/// Share of the pretension that a run takes off a span without slack: a slack span has lost all of it, to rounding.
+const TAUT: f64 = 1.0 - 1e-6;
 
 /// A limit that a reference exceeds.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,7 +48,7 @@ struct Need {
     force: f64,
     current: f64,
     voltage: f64,
-    /// Forces in the spans relative to the pretension, N.
+    /// Forces in the spans relative to the pretension, N; zero for a rigid belt.
     spans: [f64; 3],
 }
 
@@ -102,42 +106,94 @@ impl Load {
     }
 
     /// True for limits of the motor or its supply, of which a loop, or the oscillation of a stepper, needs a reserve.
-    pub(crate) fn is_of_motor(&self) -> bool {
+    pub fn is_of_motor(&self) -> bool {
         ["voltage", "current", "pull_out"].contains(&self.limit)
     }
+}
+
+/// A limit of the tension in the spans of a belt, N.
+#[derive(Clone, Copy)]
+struct Tension {
+    limit: &'static str,
+    allowed: f64,
+    /// What a span requires at rest, N, and per force relative to the pretension.
+    line: [f64; 2],
+    words: [&'static str; 3],
+}
+
+impl Tension {
+    /// Those of this belt; none if it is rigid, since the forces in its spans are unknown.
+    fn of(belt: &Belt) -> Vec<Self> {
+        let slack = belt.pretension.map(|allowed| Self {
+            limit: "slack",
+            allowed,
+            line: [0.0, -1.0],
+            words: ["takes", " off a span", ", which goes slack; the pretension is"],
+        });
+        let tension = belt.sheet.allowed_tension.map(|allowed| Self {
+            limit: "tension",
+            allowed,
+            line: [belt.pretension.unwrap_or(0.0), 1.0],
+            words: ["brings a span to", "", "; the belt may have"],
+        });
+        slack.into_iter().chain(tension).filter(|_| belt.model != BeltModel::Rigid).collect()
+    }
+
+    /// What a span with this force relative to the pretension requires, N.
+    fn needed(&self, force: f64) -> f64 {
+        let [at_rest, per_force] = self.line;
+        at_rest + per_force * force
+    }
+
+    fn demand(self) -> Demand {
+        let needed = move |need: &Need| need.spans.iter().map(|f| self.needed(*f)).fold(self.needed(0.0), f64::max);
+        let Self { limit, allowed, words, .. } = self;
+        Demand { limit, unit: "N", allowed: Box::new(move |_| allowed), needed: Box::new(needed), words }
+    }
+
+    /// The largest requirement of a run, N, and its time, s.
+    fn in_run(&self, spans: &[[Peak; 2]]) -> (f64, f64) {
+        let needs = spans.iter().flatten().map(|peak| (self.needed(peak.value), peak.time));
+        needs.fold((self.needed(0.0), 0.0), |most, need| if need.0 > most.0 { need } else { most })
+    }
+}
+
+/// Use of the belt's limits by a run with these least and greatest forces of each span relative to the pretension.
+pub fn loads_of_run(machine: &Machine, spans: &[[Peak; 2]]) -> Vec<Load> {
+    let load = |tension: Tension| {
+        let Tension { limit, allowed, .. } = tension;
+        Load { limit, unit: "N", needed: tension.in_run(spans).0, allowed }
+    };
+    Tension::of(&machine.belt).into_iter().map(load).collect()
+}
+
+/// The limits of the belt that such a run along `profile` exceeds.
+pub fn shortfalls_of_run(machine: &Machine, spans: &[[Peak; 2]], profile: &Profile) -> Vec<Shortfall> {
+    let exceeded = |tension: Tension| {
+        let Tension { limit, allowed, words: [comes_by, behind, there], .. } = tension;
+        let (needed, time) = tension.in_run(spans);
+        let at = Instant { time, y: profile.at(time) };
+        let words = || {
+            format!("its run {comes_by} {}{behind} ({}){there} {}", told(needed, "N"), at.when(), told(allowed, "N"))
+        };
+        (needed > TAUT * allowed).then(|| at.beyond(limit, [needed, allowed], "N", words()))
+    };
+    Tension::of(&machine.belt).into_iter().filter_map(exceeded).collect()
 }
 
 /// Limits of this machine under a controller with this command limit (V or A).
 fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
     let belt = &machine.belt;
-    let pretension = belt.pretension.unwrap_or(0.0);
-    let off = |need: &Need| -need.spans.iter().copied().fold(0.0, f64::min);
-    let tension = move |need: &Need| pretension + need.spans.iter().copied().fold(0.0, f64::max);
     let carried = belt.sheet.mesh(machine.pulley_radius).and_then(|(_, carried)| carried);
-    let demand = |(limit, unit), allowed: Option<f64>, needed: AtInstant, words| {
-        allowed.map(|allowed| Demand { limit, unit, allowed: Box::new(move |_| allowed), needed, words })
-    };
-    let all = [
-        demand(
-            ("slack", "N"),
-            belt.pretension,
-            Box::new(off),
-            ["takes", " off a span", ", which goes slack; the pretension is"],
-        ),
-        demand(
-            ("tension", "N"),
-            belt.sheet.allowed_tension,
-            Box::new(tension),
-            ["brings a span to", "", "; the belt may have"],
-        ),
-        demand(
-            ("teeth", "N"),
-            carried,
-            Box::new(|need| need.force.abs()),
-            ["takes", " at the drive pulley", "; the teeth in mesh carry"],
-        ),
-    ];
-    of_motor(machine, 0, limit).into_iter().chain(all.into_iter().flatten()).collect()
+    let teeth = carried.map(|carried| Demand {
+        limit: "teeth",
+        unit: "N",
+        allowed: Box::new(move |_| carried),
+        needed: Box::new(|need| need.force.abs()),
+        words: ["takes", " at the drive pulley", "; the teeth in mesh carry"],
+    });
+    let of_belt = Tension::of(belt).into_iter().map(Tension::demand).chain(teeth);
+    of_motor(machine, 0, limit).into_iter().chain(of_belt).collect()
 }
 
 /// Demands on a motor under a controller with this command limit (V or A).

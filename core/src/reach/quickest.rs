@@ -1,7 +1,7 @@
 //! Quickest moves of a machine: speed, acceleration, jerk and snap within its limits, for a gantry along its path, with
 //! jerk and snap times at the zeros of the belt's modes.
 
-use super::feasible::{limits, loads, shortfalls};
+use super::feasible::{Load, limits, loads, shortfalls};
 use super::resonance::{Drive, reaches, resonances};
 use crate::design::Design;
 use crate::error::{Error, Result};
@@ -73,6 +73,25 @@ pub fn modes(machine: &Machine) -> Vec<f64> {
     lowest.sort_by(f64::total_cmp);
     lowest.dedup_by(|next, last| (*next / *last - 1.0).abs() < SAME);
     lowest
+}
+
+/// Fractions of the limits of the machine of the file that the reference of a plan uses.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Share {
+    /// Of voltage, current and pull-out torque.
+    pub motor: f64,
+    /// Of slack, tension and teeth.
+    pub belt: f64,
+}
+
+impl Share {
+    /// The whole of each.
+    pub const ALL: Self = Self { motor: 1.0, belt: 1.0 };
+
+    /// That of the limit of this load.
+    fn of(&self, load: &Load) -> f64 {
+        if load.is_of_motor() { self.motor } else { self.belt }
+    }
 }
 
 /// Path of a move from leg to leg, without its limits.
@@ -149,7 +168,10 @@ impl Quickest<'_> {
     pub fn check(&self, way: &Way) -> Result<()> {
         let slow = Limits { speed: 1e-3, acceleration: 1e-2, jerk: None, snap: None };
         let references = self.design.shaped(&way.within(&slow)?);
-        if let Some(short) = shortfalls(self.machine, self.design.limit, &references).first() {
+        let short = shortfalls(self.machine, self.design.limit, &references);
+        // A motor that cannot break the axis away needs no word about its voltage.
+        let breakaway = short.iter().find(|short| short.limit == "breakaway");
+        if let Some(short) = breakaway.or(short.first()) {
             return Err(Error::new(format!("there is no plan: {}", short.words)));
         }
         let (volts, amperes) = limits(self.machine, self.design.limit);
@@ -182,36 +204,45 @@ impl Quickest<'_> {
         Limits { speed, acceleration, jerk: Some(jerk), snap: Some(jerk / times[1]) }
     }
 
-    /// Limits of the quickest move within this fraction of voltage and current after the reserve; none if no move is.
-    /// `others` returns the largest use of a limit by a reference, shaper included, on other machines, where 1 is
-    /// allowed.
+    /// Limits of the quickest move within these fractions of the limits, those of the motor after the reserve; none if
+    /// no move is. `others` returns the loads by a reference, shaper included, on other machines, which may use all of
+    /// each limit.
     pub fn limits_for(
         &self,
         way: &Way,
         periods: [u8; 2],
-        share: f64,
-        others: &dyn Fn(&[Profile]) -> f64,
+        share: Share,
+        others: &dyn Fn(&[Profile]) -> Vec<Load>,
     ) -> Result<Option<Limits>> {
-        let wanted = share * (1.0 - self.wanted.reserve);
+        let wanted = Share { motor: share.motor * (1.0 - self.wanted.reserve), ..share };
         let mut share = wanted;
         for _ in 0..CORRECTIONS {
             let Some(limits) = self.searched(way, periods, share) else { return Ok(None) };
             let profiles = self.design.shaped(&way.within(&limits)?);
             // On the finer grid of instants, the axis needs slightly more than during the search.
             let closely = loads(self.machine, self.design.limit, &profiles, CLOSELY);
-            let most = closely.iter().map(|load| load.share() / if load.is_of_motor() { wanted } else { 1.0 });
-            let most = most.fold(others(&profiles), f64::max);
-            if most <= 1.0 {
+            let others = others(&profiles);
+            let own = closely.iter().map(|load| (load, wanted.of(load)));
+            let mut most = Share { motor: 0.0, belt: 0.0 };
+            for (load, allowed) in own.chain(others.iter().map(|load| (load, Share::ALL.of(load)))) {
+                let most = if load.is_of_motor() { &mut most.motor } else { &mut most.belt };
+                *most = most.max(load.share() / allowed);
+            }
+            if most.motor <= 1.0 && most.belt <= 1.0 {
                 return Ok(Some(limits));
             }
-            share *= 0.995 / most;
+            for (share, most) in [(&mut share.motor, most.motor), (&mut share.belt, most.belt)] {
+                if most > 1.0 {
+                    *share *= 0.995 / most;
+                }
+            }
         }
         Ok(None)
     }
 
-    /// Limits of the quickest move with these averaging times within a share of the machine's capability; none if no
-    /// move is.
-    fn searched(&self, way: &Way, periods: [u8; 2], share: f64) -> Option<Limits> {
+    /// Limits of the quickest move with these averaging times within a share of the machine's limits; none if no move
+    /// is.
+    fn searched(&self, way: &Way, periods: [u8; 2], share: Share) -> Option<Limits> {
         let times = self.times(periods)?;
         let both: f64 = times.iter().sum();
         // T₂ = v/a ≥ T_j + T_s and D ≥ 2 a (T_j + T_s)²: a shorter stroke would shorten the jerk time.
@@ -273,10 +304,10 @@ impl Quickest<'_> {
         Some(Limits { speed, ..limits })
     }
 
-    /// True if a move within these limits uses at most this fraction of each limit of the machine.
-    fn is_within(&self, way: &Way, limits: &Limits, share: f64) -> bool {
+    /// True if a move within these limits uses at most these fractions of the limits of the machine.
+    fn is_within(&self, way: &Way, limits: &Limits, share: Share) -> bool {
         let Ok(profiles) = way.within(limits) else { return false };
         let loads = loads(self.machine, self.design.limit, &self.design.shaped(&profiles), INSTANTS);
-        loads.iter().all(|load| load.share() <= if load.is_of_motor() { share } else { 1.0 })
+        loads.iter().all(|load| load.share() <= share.of(load))
     }
 }
