@@ -122,7 +122,8 @@ fn the_spans_of_a_two_mass_belt_are_planned_within_pretension_and_allowed_tensio
         assert!(stated > 1.5, "{model}: {stated} N");
     }
     // Nothing is known of the spans of a rigid belt.
-    let case = with("rigid");
+    let mut case = with("two-mass");
+    case.machine.belt.model = BeltModel::Rigid;
     let plans = plan(&case, &[0], &FREE, &|| false).unwrap();
     let limits: Vec<&str> = plans.moves[0].loads.iter().map(|load| load.limit).collect();
     assert!(!limits.contains(&"slack") && !limits.contains(&"tension"), "{limits:?}");
