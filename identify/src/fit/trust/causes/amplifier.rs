@@ -32,7 +32,7 @@ fn asked(site: &Site) -> f64 {
 
 /// A limit below what the logs ask for.
 pub(super) fn limits(site: &Site) -> Vec<Extended> {
-    let (mut drive, most) = (site.machine.drives[0].clone(), asked(site));
+    let (mut drive, most) = (site.machine.drives[0], asked(site));
     let (key, _, own) = limit_of(&mut drive);
     if site.is_free(key) || own.is_some_and(|limit| limit < most) || most <= 0.0 {
         return Vec::new();
@@ -46,7 +46,7 @@ pub(super) fn limits(site: &Site) -> Vec<Extended> {
 }
 
 pub(super) fn limit_words(site: &Site, _: &Extended, found: &Fitted) -> Said {
-    let mut drive = site.machine.drives[0].clone();
+    let mut drive = site.machine.drives[0];
     let (key, unit, _) = limit_of(&mut drive);
     let (limit, most) = (shown(found.value, unit), shown(asked(site), unit));
     let words = format!("an amplifier that gives at most {limit} where the logs ask for up to {most}");
@@ -55,7 +55,7 @@ pub(super) fn limit_words(site: &Site, _: &Extended, found: &Fitted) -> Said {
 
 /// The machine with the limit of the case.
 pub(super) fn without_limit(site: &Site, mut machine: Machine) -> Machine {
-    let mut own = site.machine.drives[0].clone();
+    let mut own = site.machine.drives[0];
     *limit_of(&mut machine.drives[0]).2 = *limit_of(&mut own).2;
     machine
 }
