@@ -56,8 +56,8 @@ pub fn run(args: &Args) -> Outcome {
     let broken: Vec<String> = verified.iter().filter_map(|one| broken(one, &found)).collect();
     if !broken.is_empty() {
         show_warning(&format!(
-            "fits of simulated logs do not keep the predicted errors ({}): from starts that are 10 % off they end in other \
-             minima; use another --input, or fit with starts = 8",
+            "fits of simulated logs do not keep the predicted errors ({}): from starts that are 10 % off they end in \
+             other minima; use another --input, or fit with starts = 8",
             broken.join(", ")
         ));
     }

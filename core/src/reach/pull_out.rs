@@ -282,7 +282,7 @@ mod tests {
     fn between_its_speeds_a_curve_is_near_the_torque() {
         for phases in [PHASES, Phases { regulator: None, supply: 3.9, ..PHASES }] {
             let curve = Curve::new(phases);
-            for speed in [2.0, 4.5, 7.0, 30.0, 47.0, 80.0, 111.0, 160.0] {
+            for speed in [2.0, 3.0, 4.5, 7.0, 30.0, 47.0, 80.0, 111.0, 160.0] {
                 let (near, exact) = (curve.torque(speed), torque(&phases, speed));
                 assert!((near - exact).abs() < 0.02 * exact, "{speed}: {near}, {exact}");
             }

@@ -1,13 +1,12 @@
 //! The experiment in the notation of the case file.
 
 use super::Designed;
-use super::trial::hold;
+use super::trial::{hold, samples};
 use crate::case::{Case, Experiment};
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::mechanism::BODIES;
 use crate::signal::Hold;
-use crate::trajectory::Grid;
 use std::path::Path;
 
 impl Designed {
@@ -34,8 +33,7 @@ impl Designed {
         if self.initial.position != [0.0; BODIES] {
             put("initial", format!("{{ {} }}", self.start(machine)));
         }
-        let grid = Grid::new(self.every, self.duration);
-        let time: Vec<f64> = (0..=grid.intervals()).map(|k| grid.time(k)).collect();
+        let time = samples(self.every, self.duration);
         if hold(&self.driven.inputs(&self.shape), &time) == Hold::Linear {
             text.push_str("# In `log`: hold = \"linear\", since this input does not switch.\n");
         }

@@ -63,10 +63,7 @@ impl Task<'_> {
 
     /// The experiment with a log simulated by the model; `noise` selects the noise.
     pub(super) fn experiment(&self, name: &str, inputs: &[Signal], initial: State, noise: u64) -> Option<Experiment> {
-        let time: Vec<f64> = {
-            let grid = Grid::new(self.every, self.duration);
-            (0..=grid.intervals()).map(|k| grid.time(k)).collect()
-        };
+        let time = samples(self.every, self.duration);
         let until = *time.last()?;
         let mut experiment = Experiment {
             name: name.to_string(),
@@ -180,6 +177,12 @@ fn source(block: &Trajectory, quantity: Quantity) -> &[f64] {
 fn recorded(value: f64, channel: &Channel, random: &mut Pcg64) -> f64 {
     let noisy = if channel.noise > 0.0 { value + channel.noise * normal(random) } else { value };
     channel.step.map_or(noisy, |step| (noisy / step).round() * step)
+}
+
+/// Times of the samples of a log of this duration, s.
+pub(super) fn samples(every: f64, duration: f64) -> Vec<f64> {
+    let grid = Grid::new(every, duration);
+    (0..=grid.intervals()).map(|k| grid.time(k)).collect()
 }
 
 /// What a log of inputs has to say of the time between its samples: that they are held where they switch, and a line

@@ -93,7 +93,7 @@ pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Found {
     let mut changes = strongest(&whole, 0.0).is_some_and(|(_, chance)| chance < MAP_FALSE_ALARM);
     let (mut numbers, mut found): (Vec<f64>, Vec<(bool, f64)>) = (Vec::new(), Vec::new());
     for _ in 0..MAP_WAVES {
-        let Some((left, _)) = without(values, &numbers, noise.step) else { break };
+        let Some(left) = without(values, &numbers, noise.step) else { break };
         let Some((first, chance)) = strongest(&left, MAP_PERIODS / length) else { break };
         if chance >= MAP_FALSE_ALARM {
             break;
@@ -119,14 +119,13 @@ pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Found {
         }
         found.push((is_periodic, chance));
     }
-    let amplitudes = without(values, &numbers, noise.step).map(|(_, amplitudes)| amplitudes).unwrap_or_default();
     let errors = errors(values, &numbers, noise.step).unwrap_or_default();
     let wave = |(k, (is_periodic, chance)): (usize, (bool, f64))| {
         // σ² = n S w/4 of each point
         let deviation = (0.25 * noise.count() as f64 * noise.at(numbers[k])[0] * noise.weight).sqrt();
         let own = errors.get(k)?;
         let number = [numbers[k], deviation * own.number];
-        let amplitude = [amplitudes[k], deviation * own.amplitude];
+        let amplitude = [own.size, deviation * own.amplitude];
         let is_clear = amplitude[0] > MAP_ERRORS * amplitude[1];
         (is_periodic && is_clear).then_some(Wave { number, amplitude, chance })
     };
@@ -149,7 +148,7 @@ fn refine(values: &[f64], numbers: &mut [f64], step: f64, raster: f64) {
             let explained = |number: f64| {
                 all[k] = number;
                 let left = without(values, &all, step);
-                left.map_or(f64::NEG_INFINITY, |(left, _)| -left.iter().map(|y| y * y).sum::<f64>())
+                left.map_or(f64::NEG_INFINITY, |left| -left.iter().map(|y| y * y).sum::<f64>())
             };
             let ends = [numbers[k] - 0.5 * raster, numbers[k] + 0.5 * raster];
             numbers[k] = golden::top(ends, MAP_SECTIONS, explained);
@@ -175,18 +174,19 @@ fn terms(n: usize, numbers: &[f64], step: f64) -> DMatrix<f64> {
     })
 }
 
-/// Residuals of a least-squares fit of a cubic and sines with these wave numbers, and the amplitudes of the sines.
-fn without(values: &[f64], numbers: &[f64], step: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+/// Residuals of a least-squares fit of a cubic and sines with these wave numbers.
+fn without(values: &[f64], numbers: &[f64], step: f64) -> Option<Vec<f64>> {
     let matrix = terms(values.len(), numbers, step);
     let values = DVector::from_column_slice(values);
     let found = inverse_of_square(&matrix)? * matrix.tr_mul(&values);
     let left = values - &matrix * &found;
-    let amplitudes = (0..numbers.len()).map(|k| found[4 + 2 * k].hypot(found[5 + 2 * k])).collect();
-    Some((left.as_slice().to_vec(), amplitudes))
+    Some(left.as_slice().to_vec())
 }
 
-/// Errors of one of several sines with a cubic, for points with a standard deviation of 1.
+/// One of several sines with a cubic, and its errors for points with a standard deviation of 1.
 struct Errors {
+    /// Its amplitude.
+    size: f64,
     /// Standard error of the wave number, 1/m.
     number: f64,
     /// Standard error of the amplitude.
@@ -220,7 +220,7 @@ fn errors(values: &[f64], numbers: &[f64], step: f64) -> Option<Vec<Errors>> {
         let square = a * a * inverse[(i, i)] + 2.0 * a * b * inverse[(i, i + 1)] + b * b * inverse[(i + 1, i + 1)];
         let amplitude = square.max(0.0).sqrt();
         let number = inverse[(first + k, first + k)].max(0.0).sqrt();
-        Errors { number, amplitude, inflation: amplitude / (2.0 / n as f64).sqrt() }
+        Errors { size, number, amplitude, inflation: amplitude / (2.0 / n as f64).sqrt() }
     };
     Some((0..numbers.len()).map(of).collect())
 }

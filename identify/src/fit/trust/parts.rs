@@ -10,6 +10,7 @@ use crate::fit::limits::{BLOCK_SAMPLES, FEWEST_LOGS, FOLDS, LOG_BLOCKS, START_SH
 use crate::fit::search::starts::{Effort, Work, search_as_far};
 use crate::log::{Log, Output, Quantity};
 use crate::solve::Flow;
+use std::fmt::Display;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -130,6 +131,11 @@ fn by_block(logs: &[&Experiment]) -> Vec<Fold> {
     folds
 }
 
+/// The name of a part of a log that begins at this row, or a pattern of all its parts with `*` in its place.
+pub(crate) fn of_row(log: &str, row: impl Display) -> String {
+    format!("{log} from row {row}")
+}
+
 /// Some rows of an experiment's log as an experiment; `None` if they are too few.
 fn cut(experiment: &Experiment, rows: Range<usize>) -> Option<Experiment> {
     let log = experiment.log.as_ref()?;
@@ -148,7 +154,7 @@ fn cut(experiment: &Experiment, rows: Range<usize>) -> Option<Experiment> {
     };
     let initial = if rows.start == 0 { experiment.initial } else { Default::default() };
     Some(Experiment {
-        name: format!("{} from row {}", experiment.name, rows.start + 1),
+        name: of_row(&experiment.name, rows.start + 1),
         inputs: own.signals(),
         until: own.time.last().copied().unwrap_or_default(),
         every: experiment.every,

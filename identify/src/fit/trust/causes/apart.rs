@@ -3,6 +3,7 @@
 use super::extension::{Extended, Fitted, Said, Site, Telling, shown};
 use crate::case::Per;
 use crate::fit::limits::APART_MOST;
+use crate::fit::trust::parts::of_row;
 
 const GAIN: &str = "amplifier.gain";
 
@@ -26,7 +27,7 @@ pub(super) fn apart(site: &Site) -> Vec<Extended> {
         return Vec::new();
     }
     // A part of a log that is cut belongs to it.
-    let campaign = |name: &String| (name.clone(), vec![name.clone(), format!("{name} from row *")]);
+    let campaign = |name: &String| (name.clone(), vec![name.clone(), of_row(name, "*")]);
     let mut common = site.plan.clone();
     common.per = Per::Campaign;
     common.campaigns = logs.iter().map(campaign).collect();

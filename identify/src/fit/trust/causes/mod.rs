@@ -201,8 +201,9 @@ impl<'s, 'a> Folds<'s, 'a> {
     /// `None` if the prediction is not clearly better.
     fn predicts(&mut self, tried: &Tried) -> Option<[usize; 2]> {
         let (with, own) = tried.case_and_plan();
-        let set = usize::from(tried.is_apart());
-        let parts = if tried.is_apart() { Parts::blocks(&with, &own) } else { Parts::new(&with, &own) };
+        // Few logs are cut into blocks in any case.
+        let set = usize::from(tried.is_apart() && !self.sets[0].parts.is_cut);
+        let parts = if set == 1 { Parts::blocks(&with, &own) } else { Parts::new(&with, &own) };
         let count = self.sets[set].parts.folds.len().min(parts.folds.len());
         if count < 2 {
             return None;
