@@ -21,7 +21,8 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
     let _ = std::fs::remove_dir_all(&wheels);
     let mut build = Command::new(program(&environment, "maturin"));
     build.args(["build", "--locked", "--manifest-path", "py/Cargo.toml", "--profile", "dev", "--out"]).arg(&wheels);
-    build.arg("--interpreter").arg(&python);
+    // What the tests of the workspace have built already is not built again.
+    build.args(["--features", "one-build"]).arg("--interpreter").arg(&python);
     if !crate::run(build, counts)? {
         return Ok(false);
     }
@@ -32,7 +33,7 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
     let mut types = Command::new(program(&environment, "mypy"));
     types.args(["--config-file", "pyproject.toml", "python/taut"]).current_dir("py");
     let mut tests = Command::new(&python);
-    tests.args(["-m", "pytest", "--quiet", "-p", "no:cacheprovider", "py/tests"]);
+    tests.args(["-m", "pytest", "--quiet", "--numprocesses=auto", "-p", "no:cacheprovider", "py/tests"]);
     // Results are compared with those of the program.
     let Some(taut) = crate::build_program(counts)? else { return Ok(false) };
     tests.env("TAUT_PROGRAM", taut);
