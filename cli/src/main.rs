@@ -31,13 +31,12 @@ mod terminal;
 mod tune;
 
 use args::{Args, Command};
-use clap::Parser;
 use failure::Status;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
     interrupt::outlive_file_limits();
-    let args = match Args::try_parse() {
+    let args = match Args::read() {
         Ok(args) => args,
         Err(told) => return terminal::show_help_or_mistake(&told, is_json_wanted()),
     };

@@ -300,7 +300,7 @@ fn wrong_input_is_told_on_stderr_with_status_2() {
     fs::write(folder.path().join("file"), "").unwrap();
     let table4 = table4();
     let table4 = table4.to_str().unwrap();
-    let wrong: [(&[&str], &str); 14] = [
+    let wrong: [(&[&str], &str); 15] = [
         (&["simulate", "nowhere.toml"], "error: nowhere.toml: this case file cannot be read: there is no such file"),
         (&["simulate", "axis.toml"], "did you mean `torque_constant`?"),
         (&["simulate", table4, "--set", "cart.mass=0.5 m"], "a length"),
@@ -309,6 +309,7 @@ fn wrong_input_is_told_on_stderr_with_status_2() {
         (&["simulate", table4, "--solver", "table3", "--step", "0"], "a step above zero"),
         (&["simulate", table4, "--out", "file"], "error: file: this is a file, not a folder"),
         (&["simulate", table4, "--frobnicate"], "unexpected argument '--frobnicate'"),
+        (&["tune", table4, "--effort", "-1"], "a number from 0.1 to 100 is needed"),
         (&["init", "."], "this is a folder"),
         (&["simulate", table4, "--as-measured", "--out", "out"], "add [encoder] with for example at = \"motor\""),
         (&["simulate", table4, "--as-measured"], "--out <DIR>"),

@@ -112,8 +112,11 @@ fn a_force_along_the_travel_is_mapped() {
     let cases: [(&[&str], &str); 4] = [
         (&["learn", &axis, "--map", "--log", "slow.csv"], "cannot be used with"),
         (&["learn", &axis], "--log <FILE>"),
-        (&["learn", SHAPED, "--map"], "no experiment has a log"),
-        (&["learn", "stages/core-xy/core-xy.toml", "--map"], "mapped on an axis"),
+        (&["learn", SHAPED, "--map"], &format!("error: {SHAPED}: no experiment has a log")),
+        (
+            &["learn", "stages/core-xy/core-xy.toml", "--map"],
+            "core-xy.toml: a force along the travel is mapped on an axis",
+        ),
     ];
     for (args, words) in cases {
         let output = taut(args);

@@ -84,9 +84,9 @@ fn pairs_of_shapers() {
     assert!(told.contains("\nPairs\n") && told.contains("mode along the travel"), "{told}");
 }
 
-/// Bad input with `--pairs` ends as it does without: a message, and nothing on the standard output.
+/// A message, and nothing on the standard output; with `--pairs` as without.
 #[test]
-fn mistakes_with_pairs_have_their_messages() {
+fn mistakes_have_their_messages() {
     let case = "stages/printer-axis/printer-axis.toml";
     for (arguments, message) in [
         (vec![case, "--pairs=3"], "error: unexpected value '3' for '--pairs' found; no more were expected\n"),
@@ -97,6 +97,11 @@ fn mistakes_with_pairs_have_their_messages() {
         (
             vec!["stages/emps/emps.toml", "--pairs"],
             "error: stages/emps/emps.toml: a rigid belt has no resonance\n  allowed: belt.model = \"elastic\" or \"two-mass\"\n",
+        ),
+        // It was ignored.
+        (
+            vec![case, "--firmware", "klipper-2025-08", "--max-vibrations", "2"],
+            "error: --max-vibrations: Klipper until 2025-08 chooses without a limit of the vibration\n",
         ),
     ] {
         let output = taut_in(root()).arg("shape").args(&arguments).output().unwrap();

@@ -8,7 +8,7 @@ mod runs;
 mod values;
 
 pub use self::{begin::*, export::*, logs::*, loops::*, runs::*};
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 /// Belt-driven axes: described in a file, simulated exactly.
 #[derive(Debug, Parser)]
@@ -16,6 +16,19 @@ use clap::{Parser, Subcommand};
 pub struct Args {
     #[command(subcommand)]
     pub command: Command,
+}
+
+impl Args {
+    /// Reads the command line. A negative number is the value of the option before it, whose own error tells what is
+    /// allowed.
+    pub fn read() -> Result<Self, clap::Error> {
+        let with_numbers = |arg: clap::Arg| match arg.get_action().takes_values() {
+            true => arg.allow_negative_numbers(true),
+            false => arg,
+        };
+        let command = Self::command().mut_subcommands(|command| command.mut_args(with_numbers));
+        command.try_get_matches().and_then(|matches| Self::from_arg_matches(&matches))
+    }
 }
 
 /// The version, and what this program was built from.

@@ -20,7 +20,7 @@ pub fn run(args: &Args) -> Outcome {
     if let Some(folder) = &folder {
         folder::leading(&case.text, &case.files, folder.root())?;
     }
-    let found = map(&case)?;
+    let found = map(&case).map_err(|error| error.in_file(&args.case))?;
     let advice = match found.is_significant {
         true => "add --out DIR for mapped.toml, map.json and a report",
         false => "add --out DIR for map.json and a report",

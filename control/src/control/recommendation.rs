@@ -113,7 +113,7 @@ pub enum Damping {
 
 /// Reads files of vibration (spectra, samples of an accelerometer, or cases), chooses shapers, and compares two
 /// spectra. Errors: more than two files that are not taken together, files that cannot be read, options that do not fit
-/// them.
+/// them or the firmware.
 ///
 /// ```no_run
 /// use taut::control::recommendation::{Question, recommend};
@@ -128,6 +128,10 @@ pub fn recommend(args: &Question, files: &[PathBuf]) -> Result<Findings> {
     if files.len() > 2 && !args.together {
         let error = Error::new(format!("{} files, of which two can be compared", files.len())).in_file("taut shape");
         return Err(error.next("say --together to choose one shaper for all of them"));
+    }
+    if args.max_vibrations.is_some() && args.firmware == Firmware::Klipper202508 {
+        let error = Error::new("Klipper until 2025-08 chooses without a limit of the vibration");
+        return Err(error.in_file("--max-vibrations").next("leave it out, or take --firmware klipper"));
     }
     let each = match args.together {
         true => vec![together(args, files)?],
