@@ -310,7 +310,10 @@ impl<const N: usize> Core<N> {
                 }
             }
         }
-        time = time.min(law.growth_time());
+        // Nothing grows from rest.
+        if !resting || push > 0.0 {
+            time = time.min(law.growth_time());
+        }
         // A float that is too large becomes the largest integer.
         (most.min((time / self.common.h * 0.999) as u64), resting)
     }

@@ -2,8 +2,8 @@
 
 use super::flight::{Form, Guard, Moving, Quantity, REACH, Rates};
 use crate::friction::Motion;
-use crate::mechanism::{Cause, Mechanism, Mode, SpringLaw, What};
-use crate::solve::exact::matrices::{ModeMatrices, Shown};
+use crate::mechanism::{Cause, Mechanism, Mode, Shown, SpringLaw, What};
+use crate::solve::exact::matrices::{self, ModeMatrices};
 use crate::solve::exact::{Core, Space};
 use crate::solve::observe::QUANTITIES;
 use std::sync::Arc;
@@ -116,7 +116,7 @@ impl Seen {
 impl<const S: usize, const D: usize> Readings<S, D> {
     /// Those of these sums of readings; none if one of them is a way, or is not held by any spring.
     pub(super) fn of<const N: usize>(
-        shown: &Shown<N>,
+        shown: &matrices::Shown<N>,
         sums: &[Vec<(usize, f64)>],
         plan: &Plan<N>,
         alike: bool,
@@ -325,8 +325,12 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
 /// True if no reading depends on the mode.
 pub(super) fn reads_alike(mechanism: &Mechanism) -> bool {
     let plain = |law: &SpringLaw| matches!(law, SpringLaw::TwoSided | SpringLaw::None | SpringLaw::Bounds { .. });
+    let is_read = |spring: usize| {
+        let is_of = |shown: &Shown| matches!(*shown, Shown::Force(own, _) | Shown::Contact(own) if own == spring);
+        mechanism.readings.iter().any(is_of)
+    };
     mechanism.readings.len() <= QUANTITIES
-        && mechanism.springs.iter().all(|spring| plain(&spring.law))
+        && mechanism.springs.iter().enumerate().all(|(index, spring)| plain(&spring.law) || !is_read(index))
         && mechanism.drives.iter().all(|drive| {
             drive.amplifier.voltage_limit.is_none() && drive.amplifier.current_limit.is_none() && !drive.loses()
         })

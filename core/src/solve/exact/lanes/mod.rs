@@ -21,8 +21,8 @@
 //! at events and ends. All lanes do the same operations in the same order, without fused products, and none depends on
 //! another: the same bits for any vectors, neighbours and order of the queue.
 //!
-//! Left to the exact solver are machines that [`takes`] refuses, runs of more than [`MOST_STEPS`] steps, and states
-//! that are no longer finite.
+//! Left to the exact solver are machines that [`takes`] refuses, runs of more than [`MOST_STEPS`] steps, runs with a
+//! mode in which no spring bounds a quantity that is sought, and states that are no longer finite.
 
 mod flight;
 mod law;
@@ -31,9 +31,8 @@ mod peak;
 mod wide;
 
 use super::kernel::Modes;
-use super::matrices::can_grow;
 use super::{Core, ModeMatrices, SOON, Space};
-use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw};
+use crate::mechanism::{AmplifierMode, Mechanism};
 use crate::plan::Experiment;
 use crate::solve::inputs::Pieces;
 use crate::solve::observe::{Extremes, NEWS, Polynomial};
@@ -102,16 +101,13 @@ type RunOf<'a> = (&'a Experiment, Box<dyn Watcher + 'a>);
 /// A machine, and its runs.
 type Queued<'a> = (Arc<Mechanism>, Vec<RunOf<'a>>);
 
-/// True if machines of this mechanism run in lanes with inputs of this degree: piecewise linear ones without play,
-/// slack, stops, lossy gears and force lines.
+/// True if machines of this mechanism run in lanes with inputs of this degree: piecewise linear ones without lossy
+/// gears, and without rotors of their own, whose rest is followed along the run.
 pub(in crate::solve) fn takes(mechanism: &Mechanism, degree: usize) -> bool {
-    let plain = |law: &SpringLaw| matches!(law, SpringLaw::TwoSided | SpringLaw::None | SpringLaw::Bounds { .. });
     degree <= 1
         && check::piecewise_linear(mechanism).is_ok()
-        && mechanism.springs.iter().all(|spring| plain(&spring.law))
         && mechanism.bodies.iter().all(|body| !body.is_rotor)
-        && mechanism.drives.iter().all(|drive| drive.amplifier.mode != AmplifierMode::Position && !drive.loses())
-        && !can_grow(mechanism)
+        && mechanism.drives.iter().all(|drive| drive.amplifier.mode != AmplifierMode::Position)
 }
 
 /// Runs machines of the structure of `mechanism` side by side, with inputs of at most this degree.
@@ -290,7 +286,6 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         let seen = kept.mechanism.seen_by(&kept.space.layout, &start.state);
         let known = std::mem::take(&mut kept.known);
         let mut core = Core::new(seen, Arc::clone(&kept.space), &start.state, (grid.interval(), grid.end()), known);
-        core.errors = None;
         if kept.seen.is_empty() && self.prepare(&mut core, &mut kept, watcher.observed()).is_none() {
             return Self::leave(watcher, next);
         }
@@ -389,18 +384,20 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
                 self.take_input(lane);
                 continue;
             }
-            self.take_up(lane);
+            if !self.take_up(lane) {
+                return self.give_up(lane);
+            }
             if !self.rests(lane, length) {
                 return self.take_off(lane, length);
             }
         }
     }
 
-    /// Sets the numbers of the present mode in a lane.
+    /// Sets the numbers of the present mode in a lane; false if a quantity is bounded by no spring of it.
     #[inline(never)]
-    fn take_up(&mut self, lane: usize) {
+    fn take_up(&mut self, lane: usize) -> bool {
         let Self { seats, plan, slots, flight, .. } = self;
-        let Some(seat) = &mut seats[lane] else { return };
+        let Some(seat) = &mut seats[lane] else { return true };
         let Seat { core, kept, watcher, law: present, reads, .. } = &mut **seat;
         let laws = &mut kept.laws;
         let number = match laws.iter().position(|law| Arc::ptr_eq(&law.matrices, &core.matrices)) {
@@ -411,7 +408,8 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
                     None => {
                         let shown = core.matrices.shown(&core.common.mechanism, &core.common.space);
                         let own = Readings::of(shown, watcher.observed().quantities(), plan, false);
-                        Arc::new(own.expect("as in the mode in which all slide").0)
+                        let Some((own, _)) = own else { return false };
+                        Arc::new(own)
                     }
                 };
                 laws.push(Law::of(core, readings, plan, slots));
@@ -440,6 +438,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             flight.is_fresh |= guard.fresh > 0.0;
             flight.guards[slot].put(lane, &guard);
         }
+        true
     }
 
     /// Goes to the end of the piece of the inputs if nothing moves.
@@ -652,7 +651,8 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
 
     // ---- ends ----
 
-    /// A state that is no longer finite, or too many steps: from its start by the exact solver.
+    /// A state that is no longer finite, a quantity without a bound, or too many steps: from its start by the exact
+    /// solver.
     fn give_up(&mut self, lane: usize) {
         if let Some(seat) = self.seats[lane].take() {
             Self::leave(seat.watcher, seat.next);
