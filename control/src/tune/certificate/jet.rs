@@ -170,7 +170,7 @@ mod tests {
             let along = |a: f64, b: f64| move |t: f64| Complex::new(0.0, a + b * t);
             let (one, other) = (along(a, b), along(c, d));
             let whole = Jet::turning(a, b) * Jet::held(c, d) + Jet::turning_less_one(c, d);
-            let held = |x: Complex<f64>| if x.norm() < 1e-9 { Complex::ONE } else { (Complex::ONE - (-x).exp()) / x };
+            let held = |x: Complex<f64>| if x.norm() < 1e-9 { Complex::ONE } else { (-(-x).exp() + 1.0) / x };
             assert!(encloses(&whole, |t| one(t).exp() * held(other(t)) + other(t).exp() - 1.0));
             let inverse = (Jet::turning(a, b) + Jet::ONE * 1.5).inverse();
             assert!(encloses(&inverse, |t| (one(t).exp() + 1.5).inv()));
