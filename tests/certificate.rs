@@ -130,7 +130,7 @@ fn one_parameter_is_certified_up_to_the_first_violation() {
         family.machines.clear();
         let nominal = margins(&family, &design, &family.nominal());
         assert!(nominal.stable);
-        let limits = [1.1 * nominal.sensitivity, 1.1 * nominal.complementary.max(1.0)];
+        let limits = [1.02 * nominal.sensitivity, 1.02 * nominal.complementary.max(1.0)];
         let at = |off: f64| {
             let mut corner = family.nominal();
             corner.off.iter_mut().for_each(|own| *own = off);
