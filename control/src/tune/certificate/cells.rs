@@ -103,7 +103,7 @@ impl Table {
                 mixed.iter_mut().zip(values).for_each(|(sum, value)| *sum += value.abs());
             }
         }
-        (0..majors.shape.len()).for_each(|parameter| majors.to_bernstein(parameter));
+        (0..majors.shape.len()).for_each(|parameter| majors.bernstein_form(parameter));
         let is_corner = |number: usize| {
             majors.exponents(number).iter().zip(&majors.shape).all(|(power, size)| *power == 0 || power + 1 == *size)
         };
@@ -135,7 +135,7 @@ impl Table {
         let nodes = || self.nodes.chunks_exact(channels);
         let least = nodes().map(|node| node[lead]).fold(f64::INFINITY, f64::min);
         let deviation = |channel: usize| {
-            if !(least > around) {
+            if least.is_nan() || least <= around {
                 return f64::INFINITY;
             }
             let by_nodes = nodes().map(|node| others(node, channel) / node[lead]).fold(0.0, f64::max);
@@ -487,7 +487,7 @@ fn is_shown(
                     least = (value - change, node[0][0]);
                 }
             }
-            let others: f64 = minors.iter().map(|minor| of(minor)).map(|(value, change)| value.abs() + change).sum();
+            let others: f64 = minors.iter().map(of).map(|(value, change)| value.abs() + change).sum();
             if least.0 - others - limit * radii[0] - longer * radii[1] >= 0.0 {
                 return true;
             }

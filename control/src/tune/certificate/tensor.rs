@@ -82,7 +82,7 @@ impl Tensor {
 
     /// Replaces the powers of a parameter by Bernstein's polynomials: all values over the box lie within the convex
     /// hull of the coefficients.
-    pub fn to_bernstein(&mut self, parameter: usize) {
+    pub fn bernstein_form(&mut self, parameter: usize) {
         self.along(parameter, &bernstein(self.shape[parameter] - 1));
     }
 
