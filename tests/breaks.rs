@@ -15,7 +15,7 @@ const LOOPS: usize = 200;
 type Figure = (f64, fn(&AtBreak) -> f64, Break);
 
 /// Every structure that has margins, with what changes its loops. Placed gains take the place of those here.
-const STRUCTURES: [(&str, &str); 15] = [
+pub(crate) const STRUCTURES: [(&str, &str); 15] = [
     ("pid", "pid = { proportional = 1, integral = 1, derivative = 1, filter = 200 }"),
     ("pd", "pid = { proportional = 1, derivative = 1, filter = 200 }"),
     (
@@ -62,10 +62,10 @@ const STRUCTURES: [(&str, &str); 15] = [
     ),
 ];
 
-struct Draw(Pcg64);
+pub(crate) struct Draw(pub(crate) Pcg64);
 
 impl Draw {
-    fn share(&mut self) -> f64 {
+    pub(crate) fn share(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 * 2f64.powi(-53)
     }
 
@@ -78,7 +78,7 @@ impl Draw {
     }
 
     /// A machine with a controller of this structure.
-    fn case(&mut self, (name, controller): (&str, &str)) -> Case {
+    pub(crate) fn case(&mut self, (name, controller): (&str, &str)) -> Case {
         let kt = self.decades(0.01, 0.1);
         let has_current = name.contains("current");
         let inductance = if has_current || self.share() < 0.3 { self.decades(2e-4, 3e-3) } else { 0.0 };

@@ -10,6 +10,7 @@ mod case;
 mod case_documentation;
 mod case_mutations;
 mod causes;
+mod certificate;
 mod collocation;
 mod combinations;
 mod common;

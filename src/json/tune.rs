@@ -4,7 +4,9 @@ use super::moves::shortfall;
 use super::number;
 use crate::case::{Case, Move, Tuning};
 use crate::design::{Design, InDrives};
-use crate::tune::{Ahead, AtWorst, Choice, Least, Margins, MoveVerdict, Tuned, Unknown, Verdict, gains};
+use crate::tune::{
+    Ahead, AtWorst, Certificate, Choice, Corner, Family, Least, Margins, MoveVerdict, Tuned, Unknown, Verdict, gains,
+};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 
@@ -40,6 +42,7 @@ pub fn tuned(case: &Case, tuning: &Tuning, tuned: &Tuned) -> Value {
             json!({ "move": name, "limits": limits.iter().map(shortfall).collect::<Vec<_>>() })
         }).collect::<Vec<_>>(),
         "standard_moves": case.moves.is_empty(),
+        "certificate": certificate(&tuned.family, &tuned.certificate),
         "undamped_mode_Hz": tuned.undamped,
         "began_with_Hz": tuned.placed,
         "holds": tuned.holds,
@@ -144,21 +147,46 @@ fn motion(m: &MoveVerdict) -> Value {
     })
 }
 
-fn verdict(tuned: &Tuned, verdict: &Verdict) -> Value {
-    let (family, corner) = (&tuned.family, &verdict.corner);
-    let off = |(unknown, off): (&crate::tune::Unknown, &f64)| (unknown.name.clone(), json!(off));
+/// A machine of a family and its margins.
+fn machine(family: &Family, corner: &Corner, own: &Margins) -> Value {
+    let off = |(unknown, off): (&Unknown, &f64)| (unknown.name.clone(), json!(off));
     let off: serde_json::Map<String, Value> = family.unknowns.iter().zip(&corner.off).map(off).collect();
+    json!({
+        "margins": margins(own),
+        "place_m": corner.place,
+        "bridge_m": family.machine.bridge.as_ref().map(|_| corner.bridge),
+        "load_kg": corner.load,
+        "off": off,
+        "words": family.words(corner).replace('\u{a0}', " "),
+    })
+}
+
+/// What is certain about the loop on every machine of the family.
+fn certificate(family: &Family, own: &Certificate) -> Value {
+    let bounds = own
+        .bounds
+        .map(|[sensitivity, complementary]| json!({ "sensitivity": sensitivity, "complementary": complementary }));
+    let violation = own.violation.as_ref().map(|violation| {
+        json!({ "factor": violation.factor, "machine": machine(family, &violation.corner, &violation.margins) })
+    });
+    let ends = |unknown: &Unknown| {
+        let [low, high] = unknown.within(own.factor);
+        json!({ "name": unknown.name, "low": number(low), "high": number(high), "unit": unknown.unit() })
+    };
+    json!({
+        "factor": own.factor,
+        "box": family.unknowns.iter().map(ends).collect::<Vec<_>>(),
+        "bounds": bounds,
+        "violation": violation,
+        "reason": own.reason,
+    })
+}
+
+fn verdict(tuned: &Tuned, verdict: &Verdict) -> Value {
     json!({
         "objective": objective(verdict.objective),
         "nominal": margins(&verdict.nominal),
-        "worst": {
-            "margins": margins(&verdict.worst),
-            "place_m": corner.place,
-            "bridge_m": family.machine.bridge.as_ref().map(|_| corner.bridge),
-            "load_kg": corner.load,
-            "off": off,
-            "words": family.words(corner).replace('\u{a0}', " "),
-        },
+        "worst": machine(&tuned.family, &verdict.corner, &verdict.worst),
         "unstable": { "axes": verdict.unstable.0, "of": verdict.unstable.1 },
         "moves": verdict.moves.iter().map(motion).collect::<Vec<_>>(),
         "hunting": verdict.hunt.as_ref().map(|hunt| json!({

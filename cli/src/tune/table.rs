@@ -4,8 +4,8 @@ use crate::terminal::bold;
 use std::fmt::Write;
 use taut::tune::{Judgement, Verdict};
 use taut_report::tune::{
-    CHOICES, Row, Work, ahead, axes, choices, family, gains, given, goal, hunt, in_drives, limiting, margins, moves,
-    verdict,
+    CHOICES, Row, Work, ahead, axes, certificate, choices, family, gains, given, goal, hunt, in_drives, limiting,
+    margins, moves, verdict,
 };
 
 fn rows(text: &mut String, title: &str, rows: &[Row]) {
@@ -57,6 +57,8 @@ pub fn text(work: &Work, is_verbose: bool) -> String {
             "note: {told} {mode:.0} Hz on, Ms is limited by undamped modes; give belt.damping if it is known"
         );
     }
+    let [proven, violated] = certificate(work);
+    let _ = writeln!(text, "\n{}\n  proven: {proven}\n  violated {violated}", bold("Certificate"));
     // The verdict on other gains compares the moves itself.
     let is_compared = tuned.searched && tuned.judgement != Judgement::Unchanged;
     if is_verbose || !is_compared {

@@ -18,6 +18,7 @@ use crate::linear::eigen::{balance, scaled};
 use crate::machine::Machine;
 use crate::signal::profile::Reference;
 use nalgebra::{Complex, DMatrix, Schur};
+use std::ops::{Add, Mul, Sub};
 
 /// Maximum number of QR steps for the Schur form of mutually dependent states; a few for each state suffice.
 const TURNS: usize = 1000;
@@ -170,6 +171,44 @@ impl Feedback {
                 }
             }
         }
+    }
+
+    /// N_y, N_x, N_i and D, each times ∏ (z − λ) over the poles λ of the controller, without a division: at `change`, z
+    /// − 1, and `one` in numbers of any kind.
+    pub(crate) fn over_poles<N>(&self, change: N, one: N) -> [N; INPUTS]
+    where
+        N: Copy + Add<Output = N> + Sub<Output = N> + Mul<Output = N> + Mul<f64, Output = N>,
+    {
+        // As `resolve`, with everything multiplied by the factors so far.
+        let mut sums = self.direct.map(|direct| one * direct);
+        let mut row: Vec<N> = self.row.iter().map(|c| one * *c).collect();
+        let mut product = one;
+        for part in self.parts.iter().rev() {
+            let (factor, values) = match part {
+                Part::One { pole, .. } => (change - one * *pole, vec![row[row.len() - 1]]),
+                Part::Two { block: [[a, b], [c, d]], .. } => {
+                    let [.., first, second] = row[..] else { break };
+                    let (from_a, from_d) = (change - one * *a, change - one * *d);
+                    (from_a * from_d - one * (b * c), vec![from_d * first + second * *c, first * *b + from_a * second])
+                }
+            };
+            let rest = row.len() - values.len();
+            sums.iter_mut().for_each(|sum| *sum = *sum * factor);
+            for (value, inputs) in values.iter().zip(&self.inputs[rest..]) {
+                sums.iter_mut().zip(inputs).for_each(|(sum, input)| *sum = *sum + *value * *input);
+            }
+            row.truncate(rest);
+            row.iter_mut().for_each(|row| *row = *row * factor);
+            match part {
+                Part::One { of, .. } => of.iter().for_each(|&(j, a)| row[j] = row[j] + values[0] * a),
+                Part::Two { of, .. } => {
+                    of.iter().for_each(|&(j, [s, t])| row[j] = row[j] + values[0] * s + values[1] * t);
+                }
+            }
+            product = product * factor;
+        }
+        let [position, scale, current, command] = sums;
+        [position * -1.0, scale * -1.0, current * -1.0, product - command]
     }
 
     /// Poles outside of the unit circle.

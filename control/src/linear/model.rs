@@ -157,6 +157,22 @@ impl System {
         })
     }
 
+    /// ∏ over all masses, over inductances (resistances without one) and over the lengths of spans that follow the cart:
+    /// what the coefficients of `machine`'s equations have in their denominators.
+    pub(crate) fn denominator(machine: &Machine, operation: Operation) -> f64 {
+        let lengths = machine.span_lengths(&operation.coordinates(machine));
+        let plant = machine.mechanism();
+        let held = vec![false; plant.held_bodies().len()];
+        let equations = plant.equations(mode(&plant, &held, operation.speed));
+        let masses: f64 = plant.leaders().map(|body| plant.mass(body, &equations.inertia)).product();
+        let winding = |drive: &Drive| match drive.motor.inductance {
+            0.0 => drive.motor.resistance,
+            inductance => inductance,
+        };
+        let windings: f64 = plant.drives.iter().map(winding).filter(|value| *value != 0.0).product();
+        masses * windings * lengths.map_or(1.0, |lengths| lengths.into_iter().product())
+    }
+
     /// The system of one input, with zero for the others.
     ///
     /// # Panics

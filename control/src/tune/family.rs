@@ -205,7 +205,7 @@ impl Family {
     }
 
     /// Sets the deviation of an unknown and of all that vary with it.
-    fn put(&self, corner: &mut Corner, unknown: usize, off: f64) {
+    pub(super) fn put(&self, corner: &mut Corner, unknown: usize, off: f64) {
         for (other, value) in self.unknowns.iter().zip(&mut corner.off) {
             if other.with == unknown {
                 *value = off;
@@ -214,7 +214,7 @@ impl Family {
     }
 
     /// The independent unknowns.
-    fn leading(&self) -> impl Iterator<Item = usize> {
+    pub(super) fn leading(&self) -> impl Iterator<Item = usize> {
         self.unknowns.iter().enumerate().filter(|(place, unknown)| unknown.with == *place).map(|(place, _)| place)
     }
 
@@ -249,9 +249,14 @@ impl Family {
         machine
     }
 
+    /// The machine at a corner with span lengths that follow the cart.
+    pub(super) fn machine_at(&self, corner: &Corner) -> Machine {
+        following(self.stage_at(corner))
+    }
+
     /// Its response, as sampled by the controller of `design`.
     pub fn plant(&self, corner: &Corner, design: &Design, corners: &[f64]) -> Result<Plant> {
-        Plant::of(&following(self.stage_at(corner)), corner.operation(), design, corners)
+        Plant::of(&self.machine_at(corner), corner.operation(), design, corners)
     }
 
     /// Steps to these ends of each unknown, to these positions of cart and bridge, and to the loads.

@@ -6,6 +6,7 @@
 
 mod ahead;
 mod by_moves;
+mod certificate;
 mod edge;
 mod evolution;
 mod family;
@@ -31,6 +32,7 @@ mod work;
 
 pub use crate::design::placement::{first, place};
 pub use ahead::Ahead;
+pub use certificate::{Certificate, Violation};
 pub use family::{Corner, Family, MACHINES, Source};
 pub use gains::{Gain, gains};
 pub use hunting::{Hunt, hunting};
@@ -114,6 +116,8 @@ pub struct Tuned {
     pub modes: Vec<f64>,
     /// True if gains were searched for, not only judged.
     pub searched: bool,
+    /// What is certain about the tuned loop on every machine of the family, drawn or not.
+    pub certificate: Certificate,
 }
 
 /// A design that is best by some balance between error and current.
@@ -386,6 +390,8 @@ fn ended(
     let modes = work.modes().map(|(modes, _)| modes).unwrap_or_default();
     let is_undamped = belt.model != BeltModel::Rigid && belt.damping.iter().all(|damping| *damping == 0.0);
     let advice = (judgement == Judgement::Worse).then(|| without_derivative(work.case, &before.design)).flatten();
+    let limits = [work.tuning.sensitivity, work.tuning.complementary];
+    let certificate = Certificate::of(work.family, &after.design, limits, work.stop)?;
     Ok(Tuned {
         judgement,
         advice,
@@ -404,6 +410,7 @@ fn ended(
         before,
         after,
         searched: true,
+        certificate,
     })
 }
 

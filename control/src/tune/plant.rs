@@ -119,27 +119,13 @@ impl Plant {
         let frequency = grid(&models[0], t, corners);
         let geometry = machine.geometry();
         let find = |name: &str| system.output(name);
-        let measured = |drive: usize| {
-            let at = &geometry.drives[drive];
-            let pulley = format!("{}_angle", geometry.label(at.pulley).key);
-            let name = match machine.encoder.map(|encoder| encoder.at) {
-                _ if measures_cart(machine) => "cart_position",
-                Some(EncoderPlace::DrivePulley) => &pulley,
-                _ => &format!("{}_angle", at.rotor.key),
-            };
-            find(name).or(find(&pulley)).unwrap_or_default()
-        };
-        let slide = |slide: usize| {
-            let body = geometry.slides.get(slide)?.body;
-            Some(find(&format!("{}_position", geometry.label(body).key)).unwrap_or_default())
-        };
         let shares = machine.belt_shares();
         let mut sampled = Sampled {
             answers: Vec::new(),
-            measured: std::array::from_fn(measured),
-            slides: std::array::from_fn(slide),
+            measured: std::array::from_fn(|drive| measured(machine, system, drive)),
+            slides: std::array::from_fn(|number| slide(machine, system, number)),
             currents: std::array::from_fn(|drive| find(geometry.drives[drive].current_column).unwrap_or_default()),
-            length: if measures_cart(machine) { 1.0 } else { machine.pulley_radius },
+            length: length(machine),
             shares: Square::from_fn(|drive, slide| {
                 Complex::new(shares[drive].get(slide).copied().unwrap_or_default(), 0.0)
             }),
@@ -177,6 +163,32 @@ impl<const N: usize> Sampled<N> {
         }
     }
 }
+
+/// Index of the output that a drive measures.
+pub(super) fn measured(machine: &Machine, system: &StateSpace, drive: usize) -> usize {
+    let geometry = machine.geometry();
+    let at = &geometry.drives[drive];
+    let pulley = format!("{}_angle", geometry.label(at.pulley).key);
+    let name = match machine.encoder.map(|encoder| encoder.at) {
+        _ if measures_cart(machine) => "cart_position",
+        Some(EncoderPlace::DrivePulley) => &pulley,
+        _ => &format!("{}_angle", at.rotor.key),
+    };
+    system.output(name).or(system.output(&pulley)).unwrap_or_default()
+}
+
+/// Metres per unit of a measured output.
+pub(super) fn length(machine: &Machine) -> f64 {
+    if measures_cart(machine) { 1.0 } else { machine.pulley_radius }
+}
+
+/// Index of the output that is the position of a slide, if there are as many.
+pub(super) fn slide(machine: &Machine, system: &StateSpace, number: usize) -> Option<usize> {
+    let geometry = machine.geometry();
+    let body = geometry.slides.get(number)?.body;
+    Some(system.output(&format!("{}_position", geometry.label(body).key)).unwrap_or_default())
+}
+
 /// Frequencies up to half the sampling rate, dense around the poles of the axis and the controller's corners.
 fn grid(model: &Discrete, t: f64, corners: &[f64]) -> Vec<f64> {
     let most = PI / t;

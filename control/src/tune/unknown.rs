@@ -49,6 +49,11 @@ impl Unknown {
         if self.free.start > 0.0 { value.max(1e-3 * self.free.start) } else { value }
     }
 
+    /// Lowest and highest value with at most this part of its half-widths.
+    pub fn within(&self, part: f64) -> [f64; 2] {
+        [-part, part].map(|off| self.value(off))
+    }
+
     /// Deviation for this value, the argument of [`Unknown::value`].
     pub(super) fn off(&self, value: f64) -> f64 {
         let from = value - self.free.start;

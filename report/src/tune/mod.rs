@@ -7,8 +7,8 @@ mod rows;
 pub use page::page;
 pub use plots::figures;
 pub use rows::{
-    CHOICES, Row, ahead, axes, choices, family, gains, given, goal, hertz, hunt, in_drives, limiting, margins, moves,
-    summary, verdict,
+    CHOICES, Row, ahead, axes, certificate, choices, family, gains, given, goal, hertz, hunt, in_drives, limiting,
+    margins, moves, summary, verdict,
 };
 
 use taut::case::{Case, Tuning};

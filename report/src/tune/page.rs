@@ -37,6 +37,9 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
     page.table(&rows(&told::margins(&tuned.before.worst, &tuned.after.worst)));
     let [before, after] = told::limiting(work);
     page.prose(format!("Before on {before}, after on {after}."));
+    page.subsection("Certificate");
+    let [proven, violated] = told::certificate(work);
+    page.prose(format!("Proven for every machine: {proven}. Violated {violated}."));
     for (_, figure) in figures.iter().take(LOOPS) {
         page.figure(figure);
     }

@@ -401,6 +401,34 @@ pub fn family(work: &Work) -> String {
     format!("{off}{loads}{places}: {level}")
 }
 
+/// What is certain about the tuned loop on every machine of the family, in two sentences.
+pub fn certificate(work: &Work) -> [String; 2] {
+    let (family, own) = (&work.tuned.family, &work.tuned.certificate);
+    let spread = |factor: f64| match family.source {
+        Source::Spread(share) => format!("± {} %", number(100.0 * share * factor, "")),
+        Source::Fit | Source::Posterior(_) => format!("{} % of the intervals", number(100.0 * factor, "")),
+    };
+    let proven = match (&own.reason, own.bounds) {
+        (Some(reason), _) => format!("nothing: {reason}"),
+        (None, Some([ms, mt])) => format!("the whole family, {}: Ms ≤ {ms:.3}, Mt ≤ {mt:.3}", spread(1.0)),
+        (None, None) => format!("the limits hold within {} of all parameters at once", spread(own.factor)),
+    };
+    let violated = own.violation.as_ref().map(|violation| {
+        let (margins, tuning) = (&violation.margins, work.tuning);
+        let what = if !margins.stable {
+            format!("not stable, oscillates at {}", hertz(margins.at))
+        } else if margins.sensitivity / tuning.sensitivity >= margins.complementary / tuning.complementary {
+            let at = broken(margins, margins.breaks.sensitivity, None);
+            format!("Ms {:.3} at {}{at}", margins.sensitivity, hertz(margins.at))
+        } else {
+            let at = broken(margins, margins.breaks.complementary, None);
+            format!("Mt {:.3} at {}{at}", margins.complementary, hertz(margins.complementary_at))
+        };
+        format!("at {}: {what}, with {}", spread(violation.factor), family.words(&violation.corner))
+    });
+    [proven, violated.unwrap_or("by no machine that was found in the family".into())]
+}
+
 /// The goal of the search.
 pub fn goal(work: &Work) -> String {
     let tuning = work.tuning;

@@ -1,0 +1,499 @@
+//! Bounds of |S| and |T| over a box of parameters and an interval of frequencies.
+//!
+//! The axis behind a hold and a delay τ has, at z = e^{jωT}, the response Σ H(s_m) G(s_m) over all m, s_m = j(ω + 2πm/T)
+//! and H(s) = e^{−sτ} (1 − e^{−sT})/(sT). With G = n/d and the controller D u = −N y, both sides times d and the poles of
+//! the controller,
+//!
+//! ```text
+//! Δ = d (D + N R) + n N H(s₀),     R = Σ H(s_m) G(s_m) over m ≠ 0
+//! ```
+//!
+//! which like d and n is a polynomial in the parameters but for R, which is small and is bounded. |S| ≤ M means |X| ≤
+//! M |Δ| with the numerator X of S, and it holds if for each direction φ there is a θ with Re(M e^{−jθ} Δ − e^{−jφ} X) ≥ 0.
+//! That is linear in the coefficients of d and n, so its least value over the box is at least the least of those at
+//! Bernstein's coefficients.
+
+use super::axis::Axis;
+use super::jet::Jet;
+use super::tensor::Tensor;
+use crate::control::feedback::Feedback;
+use crate::tune::loops::Break;
+use nalgebra::Complex;
+use std::f64::consts::PI;
+
+/// Largest number of Bernstein's coefficients; parameters with smaller mixed terms are bounded apart.
+const NODES: usize = 128;
+
+/// Pairs of aliases m = ±1, ±2, … that are evaluated one by one.
+const ALIASES: i32 = 6;
+
+/// Rounding allowance of a coefficient relative to its magnitude: above the tolerance of the interpolation.
+const ROUNDING: f64 = 1e-10;
+
+/// Directions of X if it may have any, and the angle between directions otherwise, rad.
+const AROUND: usize = 16;
+const BETWEEN: f64 = 0.4;
+
+/// A violated limit counts from this factor on.
+const BEYOND: f64 = 1.0 + 1e-6;
+
+/// Polynomials over a box, in the form that cells need.
+pub(super) struct Table {
+    /// Channels in the middle of the box, and by how much they differ at most elsewhere.
+    center: Vec<f64>,
+    deviation: Vec<f64>,
+    /// The same of all channels over the leading one of d.
+    monic: Vec<f64>,
+    monic_deviation: Vec<f64>,
+    /// Terms linear in each parameter.
+    linear: Vec<Vec<f64>>,
+    /// Linear and quadratic terms with parameters that are not in `nodes`, and the sum of all higher ones, at most.
+    terms: Vec<Vec<f64>>,
+    mixed: Vec<f64>,
+    /// Bernstein's coefficients in all other parameters, with a mark for values that are attained at a corner.
+    nodes: Vec<f64>,
+    is_corner: Vec<bool>,
+}
+
+impl Table {
+    pub fn of(polynomials: &Tensor, axis: &Axis) -> Self {
+        let magnitudes = &axis.magnitudes;
+        let (channels, count) = (polynomials.channels, polynomials.count());
+        let size = polynomials.shape.len();
+        let center = polynomials.channels_of(0).to_vec();
+        let mut linear = vec![vec![0.0; channels]; size];
+        let mut deviation = vec![0.0; channels];
+        let mut mixing = vec![0.0; size];
+        for number in 1..count {
+            let exponents = polynomials.exponents(number);
+            let values = polynomials.channels_of(number);
+            deviation.iter_mut().zip(values).for_each(|(sum, value)| *sum += value.abs());
+            if exponents.iter().sum::<usize>() == 1 {
+                let parameter = exponents.iter().position(|power| *power == 1).unwrap_or_default();
+                linear[parameter] = values.to_vec();
+                continue;
+            }
+            let relative = values.iter().zip(magnitudes).map(|(value, size)| value.abs() / size.max(f64::MIN_POSITIVE));
+            let relative: f64 = relative.sum();
+            mixing.iter_mut().zip(&exponents).filter(|(_, power)| **power > 0).for_each(|(sum, _)| *sum += relative);
+        }
+        let mut order: Vec<usize> = (0..size).collect();
+        order.sort_by(|&a, &b| mixing[b].total_cmp(&mixing[a]));
+        let mut nodes = 1;
+        let mut is_major = vec![false; size];
+        for parameter in order {
+            let own = polynomials.shape[parameter];
+            if nodes * own <= NODES {
+                nodes *= own;
+                is_major[parameter] = true;
+            }
+        }
+        let shape = (0..size).filter(|&parameter| is_major[parameter]).map(|parameter| polynomials.shape[parameter]);
+        let mut majors = Tensor { shape: shape.collect(), channels, values: Vec::new() };
+        let mut mixed = vec![0.0; channels];
+        let mut terms = Vec::new();
+        for number in 0..count {
+            let exponents = polynomials.exponents(number);
+            let values = polynomials.channels_of(number);
+            if exponents.iter().zip(&is_major).all(|(power, is_major)| *is_major || *power == 0) {
+                majors.values.extend(values);
+            } else if exponents.iter().sum::<usize>() <= 2 {
+                terms.push(values.to_vec());
+            } else {
+                mixed.iter_mut().zip(values).for_each(|(sum, value)| *sum += value.abs());
+            }
+        }
+        (0..majors.shape.len()).for_each(|parameter| majors.bernstein_form(parameter));
+        let is_corner = |number: usize| {
+            majors.exponents(number).iter().zip(&majors.shape).all(|(power, size)| *power == 0 || power + 1 == *size)
+        };
+        let mut table = Self {
+            is_corner: (0..majors.count()).map(is_corner).collect(),
+            center,
+            deviation,
+            monic: Vec::new(),
+            monic_deviation: Vec::new(),
+            linear,
+            terms,
+            mixed,
+            nodes: majors.values,
+        };
+        table.divide(axis.orders[0] - 1);
+        table
+    }
+
+    /// Bounds all channels over the channel `lead`, which is positive.
+    ///
+    /// With Bernstein's polynomials B, a/w = Σ B a_B / Σ B w_B is a mean of a_B/w_B with the weights B w_B. What other
+    /// parameters add to a − r w with r = a₀/w₀ is at most divided by the least w.
+    fn divide(&mut self, lead: usize) {
+        let (channels, w) = (self.center.len(), self.center[lead]);
+        self.monic = self.center.iter().map(|a| a / w).collect();
+        let others =
+            |channels: &[f64], channel: usize| (channels[channel] - self.monic[channel] * channels[lead]).abs();
+        let around: f64 = self.terms.iter().map(|term| term[lead].abs()).sum::<f64>() + self.mixed[lead];
+        let nodes = || self.nodes.chunks_exact(channels);
+        let least = nodes().map(|node| node[lead]).fold(f64::INFINITY, f64::min);
+        let deviation = |channel: usize| {
+            if least.is_nan() || least <= around {
+                return f64::INFINITY;
+            }
+            let by_nodes = nodes().map(|node| others(node, channel) / node[lead]).fold(0.0, f64::max);
+            let minors: f64 = self.terms.iter().map(|term| others(term, channel)).sum();
+            let mixed = self.mixed[channel] + self.monic[channel].abs() * self.mixed[lead];
+            by_nodes * (least + around) / (least - around) + (minors + mixed) / (least - around)
+        };
+        self.monic_deviation = (0..channels).map(deviation).collect();
+    }
+
+    /// Effort of a cell.
+    pub fn effort(&self) -> usize {
+        self.is_corner.len() + self.terms.len() + 50
+    }
+}
+
+/// What is to be shown: limits of |S| and |T| at the breaks of a loop; infinite if one is not asked.
+pub(super) struct Question<'a> {
+    pub axis: &'a Axis<'a>,
+    pub feedback: &'a Feedback,
+    pub breaks: &'static [Break],
+    pub limits: [f64; 2],
+    /// T and τ, s.
+    pub every: f64,
+    pub delay: f64,
+}
+
+/// What a cell shows.
+pub(super) enum Seen {
+    /// All limits hold, and the loop has no pole on the unit circle.
+    Holds,
+    /// Not shown: a shorter interval of frequencies may suffice.
+    TooWide,
+    /// Not shown: the box is too large, most of all in this parameter.
+    TooLarge(usize),
+    /// A machine of the box violates a limit.
+    Violated,
+}
+
+/// A linear form of the channels, and the parts of it that are bounded.
+#[derive(Clone)]
+struct Form {
+    /// Coefficients at the middle of the interval, and their changes along it, linear and quadratic.
+    still: Vec<Complex<f64>>,
+    change: Vec<Complex<f64>>,
+    bend: Vec<Complex<f64>>,
+    /// Bound of what the interval adds beyond, and of all else.
+    curved: f64,
+    other: f64,
+}
+
+impl Form {
+    /// Largest value over the box in the middle of the interval, and what the interval adds at most.
+    fn most(&self, table: &Table) -> [f64; 2] {
+        let channels = table.center.len();
+        let of = |values: &[f64]| {
+            [dot(&self.still, values).norm(), dot(&self.change, values).norm() + dot(&self.bend, values).norm()]
+        };
+        let larger = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
+        let nodes = table.nodes.chunks_exact(channels).map(of).fold([0.0; 2], larger);
+        let sum = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
+        let minors = table.terms.iter().map(|term| of(term)).fold(nodes, sum);
+        sum(minors, [self.other, self.curved])
+    }
+}
+
+fn dot(form: &[Complex<f64>], channels: &[f64]) -> Complex<f64> {
+    form.iter().zip(channels).map(|(a, b)| a * b).sum()
+}
+
+impl Question<'_> {
+    /// Looks at the frequencies from `low` to `high`, in units of half the sampling rate.
+    pub fn look(&self, table: &Table, low: f64, high: f64) -> Seen {
+        let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
+        let orders = &self.axis.orders;
+        let most_power = orders.iter().copied().max().unwrap_or(1);
+        // s/Ω = jσ, σ = middle + half t; ωT = πσ
+        let [angle, width] = [middle, half].map(|sigma| PI * sigma);
+        let change = Jet::turning_less_one(angle, width);
+        let [position, scale, _, own] = self.feedback.over_poles(change, Jet::ONE);
+        let terms = [position, scale];
+        let powers = powers(middle, half, most_power);
+        let late = self.delay / self.every;
+        let held = Jet::turning(-late * angle, -late * width) * Jet::held(angle, width);
+        let aliases = self.aliases(table, middle, half);
+        // Factors of d and of each n in D and in N G of each output, and how much that of d depends on the parameters.
+        let none = Factors { jets: vec![Jet::ZERO; orders.len()], spread: 0.0 };
+        let mut direct = none.clone();
+        direct.jets[0] = own;
+        let of_output = |(output, (term, alias)): (usize, (&Jet, &(Jet, f64)))| {
+            let mut factors = none.clone();
+            (factors.jets[0], factors.jets[1 + output]) = (*term * alias.0, *term * held);
+            Factors { spread: term.most() * alias.1, ..factors }
+        };
+        let parts: Vec<Factors> = terms.iter().zip(&aliases).enumerate().map(of_output).collect();
+        let whole = parts.iter().fold(direct.clone(), |sum, part| sum.plus(part));
+        // |d| in the middle of the interval, and what the interval adds.
+        let mut alone = none.clone();
+        alone.jets[0] = Jet::ONE;
+        let bottom = self.form(table, &powers, &alone, [0.0; 2]).most(table);
+        let closed = self.form(table, &powers, &whole, bottom);
+        let mut worst = Seen::Holds;
+        for &at in self.breaks {
+            // The two parts of Δ at this break.
+            let outer = match at {
+                Break::Command => None,
+                Break::Position => Some(0),
+                Break::Scale => Some(1),
+                Break::Current => continue,
+            };
+            let mut both = [direct.clone(), none.clone()];
+            for (output, part) in parts.iter().enumerate() {
+                let is_outer = outer.is_none_or(|outer| outer == output);
+                both[usize::from(is_outer)] = both[usize::from(is_outer)].plus(part);
+            }
+            let [inner, outer] = both.map(|factors| self.form(table, &powers, &factors, bottom));
+            for (numerator, limit) in [inner, outer].iter().zip(self.limits) {
+                if limit.is_infinite() {
+                    continue;
+                }
+                match shown(table, &closed, numerator, limit) {
+                    Seen::Holds => {}
+                    Seen::Violated => return Seen::Violated,
+                    seen @ Seen::TooLarge(_) => worst = seen,
+                    Seen::TooWide => {
+                        if matches!(worst, Seen::Holds) {
+                            worst = Seen::TooWide;
+                        }
+                    }
+                }
+            }
+        }
+        worst
+    }
+
+    /// Σ H(s_m) G(s_m) over m ≠ 0, for each output, of the machine in the middle of the box, and how far that of another
+    /// machine may be from it.
+    fn aliases(&self, table: &Table, middle: f64, half: f64) -> Vec<(Jet, f64)> {
+        let orders = &self.axis.orders;
+        let most_power = orders.iter().copied().max().unwrap_or(1);
+        let late = self.delay / self.every;
+        // 1 − 1/z
+        let step = Jet::turning_less_one(-PI * middle, -PI * half) * -1.0;
+        let mut sums = vec![(Jet::ZERO, 0.0); orders.len() - 1];
+        let ranges = ranges(orders);
+        let polynomial = |powers: &[Jet], range: &std::ops::Range<usize>| {
+            let of = |(power, value): (&Jet, &f64)| *power * *value;
+            powers.iter().zip(&table.monic[range.clone()]).map(of).fold(Jet::ZERO, |a, b| a + b)
+        };
+        let off = |sizes: &[f64], range: &std::ops::Range<usize>, sigma: f64| -> f64 {
+            sizes[range.clone()].iter().rev().fold(0.0, |sum, size| sum * sigma + size)
+        };
+        for m in (1..=ALIASES).flat_map(|m| [-m, m]) {
+            let sigma = middle + 2.0 * f64::from(m);
+            let powers = powers(sigma, half, most_power);
+            let bottom = polynomial(&powers, &ranges[0]);
+            let inverse = bottom.inverse();
+            let size = sigma.abs() + half;
+            let bottom_off = off(&table.monic_deviation, &ranges[0], size);
+            // H(s_m) = e^{−s_m τ} (1 − 1/z)/(s_m T)
+            let time =
+                Jet { c: [Complex::new(0.0, PI * sigma), Complex::new(0.0, PI * half), Complex::ZERO], radius: 0.0 };
+            let hold = Jet::turning(-late * PI * sigma, -late * PI * half) * step * time.inverse();
+            for (sum, range) in sums.iter_mut().zip(&ranges[1..]) {
+                let response = polynomial(&powers, range) * inverse;
+                // |n/d − n₀/d₀| ≤ (|n − n₀| + |n₀/d₀| |d − d₀|)/|d|
+                let least = bottom.least() - bottom_off;
+                let top_off = off(&table.monic_deviation, range, size);
+                let away = if least > 0.0 { (top_off + response.most() * bottom_off) / least } else { f64::INFINITY };
+                *sum = (sum.0 + hold * response, sum.1 + hold.most() * away);
+            }
+        }
+        // Beyond |σ| = 2M + 1, |n/d| falls at least as fast as 1/σ²: the sum of |H G| over |m| > M is at most
+        // 2 |1 − 1/z|/π · |G| (1/(2M + 1) + 1/4).
+        let far = f64::from(2 * ALIASES + 1);
+        let most: Vec<f64> = table.monic.iter().zip(&table.monic_deviation).map(|(a, b)| a.abs() + b).collect();
+        let last = ranges[0].end - 1;
+        let least = far.powi(last as i32) - off(&most, &(0..last), far);
+        for (sum, range) in sums.iter_mut().zip(&ranges[1..]) {
+            let is_bounded = least > 0.0 && range.len() + 2 <= ranges[0].len();
+            let far_off = if is_bounded { off(&most, range, far) / least } else { f64::INFINITY };
+            sum.1 += 2.0 * step.most() / PI * far_off * (1.0 / far + 0.25);
+        }
+        sums
+    }
+
+    /// Σ factor · polynomial as a form of the channels.
+    fn form(&self, table: &Table, powers: &[Jet], factors: &Factors, bottom: [f64; 2]) -> Form {
+        let channels = table.center.len();
+        let none = vec![Complex::ZERO; channels];
+        let mut form = Form { still: none.clone(), change: none.clone(), bend: none, curved: 0.0, other: 0.0 };
+        for (range, jet) in ranges(&self.axis.orders).into_iter().zip(&factors.jets) {
+            for (channel, power) in range.zip(powers) {
+                let term = *jet * *power;
+                let most = table.center[channel].abs() + table.deviation[channel];
+                (form.still[channel], form.change[channel], form.bend[channel]) = (term.c[0], term.c[1], term.c[2]);
+                form.curved += most * term.radius;
+                form.other += (table.mixed[channel] + ROUNDING * self.axis.magnitudes[channel]) * term.most();
+            }
+        }
+        if factors.spread > 0.0 {
+            form.other += factors.spread * bottom[0];
+            form.curved += factors.spread * bottom[1];
+        }
+        form
+    }
+}
+
+/// Factors of d and of each n in a sum.
+#[derive(Clone)]
+struct Factors {
+    jets: Vec<Jet>,
+    /// How far the factor of d may be from its jet in the box.
+    spread: f64,
+}
+
+impl Factors {
+    fn plus(&self, other: &Self) -> Self {
+        let jets = self.jets.iter().zip(&other.jets).map(|(a, b)| *a + *b).collect();
+        Self { jets, spread: self.spread + other.spread }
+    }
+}
+
+/// Channels of d and each n.
+fn ranges(orders: &[usize]) -> Vec<std::ops::Range<usize>> {
+    let mut begin = 0;
+    let of = |order: &usize| {
+        begin += order;
+        begin - order..begin
+    };
+    orders.iter().map(of).collect()
+}
+
+/// (j(σ + h t))ᵏ for all k below `count`.
+fn powers(sigma: f64, h: f64, count: usize) -> Vec<Jet> {
+    let j = Complex::new(0.0, 1.0);
+    let of = |k: usize| {
+        let turn = j.powu(k as u32);
+        let power = |less: usize| if k >= less { sigma.powi((k - less) as i32) } else { 0.0 };
+        let k = k as f64;
+        let values = [power(0), k * power(1) * h, 0.5 * k * (k - 1.0) * power(2) * h * h];
+        // All further terms of the binomial have positive coefficients of |σ| and h.
+        let sizes: f64 = values.iter().map(|value| value.abs()).sum();
+        let beyond = ((sigma.abs() + h).powf(k) - sizes).max(0.0);
+        Jet { c: values.map(|value| turn * value), radius: beyond + 1e-14 * sizes }
+    };
+    (0..count).map(of).collect()
+}
+
+/// Δ and X of a node: in the middle of the interval, and what is linear and quadratic along it.
+type Node = [[Complex<f64>; 3]; 2];
+
+/// Checks |X| ≤ M |Δ|.
+fn shown(table: &Table, closed: &Form, numerator: &Form, limit: f64) -> Seen {
+    let channels = table.center.len();
+    let [center, top] = [closed, numerator].map(|form| dot(&form.still, &table.center));
+    if top.norm() > limit * BEYOND * center.norm() + closed.other * limit + numerator.other {
+        return Seen::Violated;
+    }
+    // Δ and X of each node, and their change along the interval.
+    let at = |channels: &[f64]| {
+        [closed, numerator].map(|form| [&form.still, &form.change, &form.bend].map(|form| dot(form, channels)))
+    };
+    let nodes: Vec<Node> = table.nodes.chunks_exact(channels).map(at).collect();
+    let minors: Vec<Node> = table.terms.iter().map(|term| at(term)).collect();
+    let corners = nodes.iter().zip(&table.is_corner).filter(|(_, is_corner)| **is_corner);
+    for (node, _) in corners {
+        if node[1][0].norm() > limit * BEYOND * node[0][0].norm() + closed.other * limit + numerator.other {
+            return Seen::Violated;
+        }
+    }
+    let check = |is_still: bool| is_shown(&nodes, &minors, [center, top], [closed, numerator], limit, is_still);
+    if check(false) {
+        return Seen::Holds;
+    }
+    if check(true) {
+        return Seen::TooWide;
+    }
+    let weight = |linear: &Vec<f64>| limit * dot(&closed.still, linear).norm() + dot(&numerator.still, linear).norm();
+    let weights: Vec<f64> = table.linear.iter().map(weight).collect();
+    let most = (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b]));
+    match most {
+        // A single machine: its interval is all that is left.
+        None => Seen::TooWide,
+        Some(parameter) => Seen::TooLarge(parameter),
+    }
+}
+
+/// Whether |X| ≤ M |Δ| follows; with `is_still`, in the middle of the interval alone.
+fn is_shown(
+    nodes: &[Node],
+    minors: &[Node],
+    [center, top]: [Complex<f64>; 2],
+    [closed, numerator]: [&Form; 2],
+    limit: f64,
+    is_still: bool,
+) -> bool {
+    let along = if is_still { 0.0 } else { 1.0 };
+    let radii = [closed, numerator].map(|form| form.other + along * form.curved);
+    let away = |values: &Node, from: [Complex<f64>; 2]| {
+        [0, 1].map(|k| {
+            let [still, change, bend] = values[k];
+            (still - from[k]).norm() + along * (change.norm() + bend.norm())
+        })
+    };
+    let mut off = radii;
+    for minor in minors {
+        let own = away(minor, [Complex::ZERO; 2]);
+        off = [off[0] + own[0], off[1] + own[1]];
+    }
+    let hull = nodes
+        .iter()
+        .map(|node| away(node, [center, top]))
+        .fold([0.0_f64; 2], |most, own| [most[0].max(own[0]), most[1].max(own[1])]);
+    off = [off[0] + hull[0], off[1] + hull[1]];
+    if off.iter().any(|off| !off.is_finite()) {
+        return false;
+    }
+    // Discs around both suffice for most.
+    if limit * (center.norm() - off[0]) >= top.norm() + off[1] {
+        return true;
+    }
+    let (directions, apart) = if off[1] < 0.95 * top.norm() {
+        let half = (off[1] / top.norm()).asin();
+        let count = (2.0 * half / BETWEEN).ceil().max(1.0);
+        let apart = 2.0 * half / count;
+        let first = top.arg() - half + 0.5 * apart;
+        ((0..count as usize).map(|k| first + apart * k as f64).collect::<Vec<_>>(), apart)
+    } else {
+        let apart = 2.0 * PI / AROUND as f64;
+        ((0..AROUND).map(|k| apart * k as f64).collect(), apart)
+    };
+    // |X| is at most its part along the nearest direction over the cosine of the angle between them.
+    let longer = 1.0 / (0.5 * apart).cos();
+    directions.into_iter().all(|phi| {
+        let turn = Complex::new(0.0, -phi).exp() * longer;
+        let mut theta = center.arg();
+        for _ in 0..3 {
+            let lead = Complex::new(0.0, -theta).exp() * limit;
+            let part = |delta: Complex<f64>, x: Complex<f64>| (lead * delta - turn * x).re;
+            let of = |values: &Node| {
+                let [still, change, bend] = [0, 1, 2].map(|k| part(values[0][k], values[1][k]));
+                (still, along * (change.abs() + bend.abs()))
+            };
+            let mut least = (f64::INFINITY, center);
+            for node in nodes {
+                let (value, change) = of(node);
+                if value - change < least.0 {
+                    least = (value - change, node[0][0]);
+                }
+            }
+            let others: f64 = minors.iter().map(of).map(|(value, change)| value.abs() + change).sum();
+            if least.0 - others - limit * radii[0] - longer * radii[1] >= 0.0 {
+                return true;
+            }
+            // Towards the worst node.
+            theta += 0.5 * (least.1 * Complex::new(0.0, -theta).exp()).arg();
+        }
+        false
+    })
+}

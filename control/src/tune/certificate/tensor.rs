@@ -1,0 +1,113 @@
+//! Polynomials in several parameters over a box, each parameter from −1 to 1.
+
+use nalgebra::DMatrix;
+
+/// Coefficients of one polynomial for each channel: for each product of powers of the parameters the channels side by
+/// side.
+#[derive(Debug, Clone)]
+pub(super) struct Tensor {
+    /// Number of powers of each parameter: its degree plus one.
+    pub shape: Vec<usize>,
+    pub channels: usize,
+    pub values: Vec<f64>,
+}
+
+/// Points of an interpolation of this degree from −1 to 1.
+pub(super) fn points(degree: usize) -> Vec<f64> {
+    match degree {
+        0 => vec![0.0],
+        _ => (0..=degree).map(|k| -(std::f64::consts::PI * k as f64 / degree as f64).cos()).collect(),
+    }
+}
+
+/// From values at [`points`] to coefficients of powers.
+pub(super) fn from_points(degree: usize) -> DMatrix<f64> {
+    let points = points(degree);
+    let powers = DMatrix::from_fn(degree + 1, degree + 1, |i, j| points[i].powi(j as i32));
+    powers.try_inverse().expect("interpolation points are distinct")
+}
+
+fn choose(n: usize, k: usize) -> f64 {
+    (0..k).map(|i| (n - i) as f64 / (i + 1) as f64).product()
+}
+
+/// From powers of t to powers of τ, t = c + h τ.
+fn substituted(degree: usize, c: f64, h: f64) -> DMatrix<f64> {
+    DMatrix::from_fn(degree + 1, degree + 1, |j, i| match i.checked_sub(j) {
+        None => 0.0,
+        Some(rest) => choose(i, j) * c.powi(rest as i32) * h.powi(j as i32),
+    })
+}
+
+/// From powers of t to the coefficients of Bernstein's polynomials over −1 ≤ t ≤ 1.
+fn bernstein(degree: usize) -> DMatrix<f64> {
+    let share =
+        DMatrix::from_fn(degree + 1, degree + 1, |i, j| if j <= i { choose(i, j) / choose(degree, j) } else { 0.0 });
+    share * substituted(degree, -1.0, 2.0)
+}
+
+impl Tensor {
+    /// Number of products of powers.
+    pub fn count(&self) -> usize {
+        self.shape.iter().product()
+    }
+
+    /// Applies a matrix along a parameter.
+    pub fn along(&mut self, parameter: usize, matrix: &DMatrix<f64>) {
+        let size = self.shape[parameter];
+        let inner: usize = self.shape[parameter + 1..].iter().product::<usize>() * self.channels;
+        let mut line = vec![0.0; size * inner];
+        for block in self.values.chunks_exact_mut(size * inner) {
+            line.fill(0.0);
+            for i in 0..size {
+                for j in 0..size {
+                    let factor = matrix[(i, j)];
+                    if factor != 0.0 {
+                        let (to, from) = (&mut line[i * inner..(i + 1) * inner], &block[j * inner..(j + 1) * inner]);
+                        to.iter_mut().zip(from).for_each(|(to, from)| *to += factor * from);
+                    }
+                }
+            }
+            block.copy_from_slice(&line);
+        }
+    }
+
+    /// The polynomials over a part of the box: a parameter t from c − h to c + h.
+    pub fn narrow(&mut self, parameter: usize, c: f64, h: f64) {
+        let degree = self.shape[parameter] - 1;
+        if degree > 0 && (c != 0.0 || h != 1.0) {
+            self.along(parameter, &substituted(degree, c, h));
+        }
+    }
+
+    /// Replaces the powers of a parameter by Bernstein's polynomials: all values over the box lie within the convex
+    /// hull of the coefficients.
+    pub fn bernstein_form(&mut self, parameter: usize) {
+        self.along(parameter, &bernstein(self.shape[parameter] - 1));
+    }
+
+    /// Exponents of a product of powers by its number.
+    pub fn exponents(&self, mut number: usize) -> Vec<usize> {
+        let mut all = vec![0; self.shape.len()];
+        for (exponent, size) in all.iter_mut().zip(&self.shape).rev() {
+            (*exponent, number) = (number % size, number / size);
+        }
+        all
+    }
+
+    /// Channels of a product of powers.
+    pub fn channels_of(&self, number: usize) -> &[f64] {
+        &self.values[number * self.channels..(number + 1) * self.channels]
+    }
+
+    /// The polynomials at a point.
+    pub fn at(&self, point: &[f64]) -> Vec<f64> {
+        let mut sums = vec![0.0; self.channels];
+        for number in 0..self.count() {
+            let exponents = self.exponents(number);
+            let factor: f64 = exponents.iter().zip(point).map(|(power, t)| t.powi(*power as i32)).product();
+            sums.iter_mut().zip(self.channels_of(number)).for_each(|(sum, value)| *sum += factor * value);
+        }
+        sums
+    }
+}
