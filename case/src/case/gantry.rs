@@ -6,7 +6,7 @@ use super::{input, machine, sheet, stepper};
 use crate::error::{Error, Result};
 use crate::friction::Friction;
 use crate::machine::{
-    Belt, BeltMake, BeltSheet, DriveAt, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans,
+    Belt, BeltMake, BeltSheet, DriveAt, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans, Yaw,
 };
 use crate::mechanism::{STEPPERS, State};
 use crate::signal::Signal;
@@ -97,6 +97,7 @@ fn gantry(root: &Table, kind: Kind) -> Result<Machine> {
         drive_pulley: machine::pulley(&pulley)?,
         idler_pulley: Pulley { inertia: 0.0, friction: Friction::default() },
         bridge: Some(bridge),
+        yaw: yaw(root)?,
         cart,
         belt: belts,
         encoder,
@@ -164,6 +165,24 @@ fn slide(root: &Table, name: &str) -> Result<Slide> {
     table.check_keys(&[], &[])?;
     let travel = table.optional("travel").map(|field| machine::travel(&field.table()?)).transpose()?;
     Ok(Slide { travel, ..Slide::new(table.number("mass")?, friction(&table)?) })
+}
+
+/// Yaw of the bridge, if the file describes it.
+fn yaw(root: &Table) -> Result<Option<Yaw>> {
+    let of = |name: &str| root.optional(name).map(|field| field.named("bridge").table()).transpose();
+    if let Some(field) = of("cart")?.and_then(|cart| cart.optional("yaw")) {
+        return Err(field.fail("only the bridge yaws").next("move it to [bridge.yaw]"));
+    }
+    let Some(field) = of("bridge")?.and_then(|bridge| bridge.optional("yaw")) else { return Ok(None) };
+    let table = field.table()?;
+    table.check_keys(&[], &[])?;
+    Ok(Some(Yaw {
+        inertia: table.number("inertia")?,
+        belt_spacing: table.number("belt_spacing")?,
+        bearing_spacing: table.number("bearing_spacing")?,
+        bearing_stiffness: table.number("bearing_stiffness")?,
+        bearing_damping: table.number("bearing_damping")?,
+    }))
 }
 
 fn belts(table: &Table, kind: Kind) -> Result<Belt> {
