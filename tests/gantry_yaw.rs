@@ -216,7 +216,10 @@ fn rows(case: &Case, run: &Solution) -> Vec<Vec<f64>> {
 #[test]
 fn runs_are_those_of_lagranges_equations_within_the_stated_error() {
     for kind in KINDS {
-        let plain = Plain::of(case(kind, (SOFT, 1.0), ("", "")));
+        let mut case = case(kind, (SOFT, 1.0), ("", ""));
+        // The ends of the bridge begin up to half a millimetre from where the belts are without strain.
+        case.experiments[0].initial.position[case.machine.yaw_body().unwrap()] = 2e-3;
+        let plain = Plain::of(case);
         let (machine, experiment) = (&plain.case.machine, &plain.case.experiments[0]);
         assert_eq!(Solver::of(machine), Solver::GENERAL);
         let run = common::complete(&plain.case, Solver::GENERAL);
@@ -301,32 +304,34 @@ fn a_stiff_bridge_moves_as_one_that_does_not_yaw() {
 
 #[test]
 fn friction_of_a_bridge_at_rest_holds_what_the_cart_does_to_it() {
-    let mut by_the_cart: f64 = 0.0;
-    for kind in KINDS {
+    let (mut by_the_cart, mut stuck, mut loads) = (0.0_f64, 0, Vec::new());
+    for (kind, yaw) in KINDS.into_iter().flat_map(|kind| [1e-5, 5e-5, 3e-4, 1e-3, 3e-3].map(|yaw| (kind, yaw))) {
         let dry = ", coulomb = \"1 N\", static = \"1.5 N\"";
-        let mut plain = Plain::of(plucked(kind, 2e-5, dry));
+        let mut plain = Plain::of(plucked(kind, yaw, dry));
         plain.is_held = true;
         let (p, run) = (plain.pulleys, common::complete(&plain.case, Solver::General { tolerance: 1e-11 }));
-        let friction = run.trajectory.get("bridge_friction").unwrap();
-        let (mut stuck, rows) = (0, rows(&plain.case, &run));
-        for (row, have) in rows.iter().zip(friction) {
-            let (q, v) = row.split_at(p + 3);
-            if v[p] != 0.0 {
+        let column = |name: &str| run.trajectory.get(name).unwrap();
+        for ((row, have), state) in
+            rows(&plain.case, &run).iter().zip(column("bridge_friction")).zip(column("bridge_state"))
+        {
+            if *state != 0.0 {
                 continue;
             }
+            let (q, v) = row.split_at(p + 3);
             let want = plain.accelerations(q, v).1;
             by_the_cart = by_the_cart.max((want - plain.forces(q, v)[p]).abs());
             stuck += 1;
             assert!((have - want).abs() < 1e-6 && have.abs() < 1.5 + 1e-6, "{kind}: {have} N instead of {want} N");
         }
-        let breaks =
-            run.outcome.events.iter().filter(|event| event.part.key() == "bridge" && event.from.word() == "stuck");
-        let loads: Vec<f64> = breaks.map(|event| event.load.abs()).collect();
-        println!("{kind}: {stuck} rows at rest, broken away at {loads:?}");
-        assert!(stuck > 3 && !loads.is_empty(), "{kind}: {stuck} rows at rest");
-        assert!(loads.iter().all(|load| *load >= 1.5 - 1e-6), "{kind}: {loads:?}");
+        let from_rest = |event: &&taut::solve::Event| event.part.key() == "bridge" && event.from.word() == "stuck";
+        // At time zero a load beyond the breakaway is one.
+        loads.extend(run.outcome.events.iter().filter(from_rest).map(|event| (event.time, event.load.abs())));
     }
-    assert!(by_the_cart > 0.1, "{by_the_cart}");
+    let late: Vec<f64> = loads.iter().filter(|(time, _)| *time > 0.0).map(|(_, load)| *load).collect();
+    println!("{stuck} rows at rest, up to {by_the_cart} N by the cart, broken away at {late:?}");
+    assert!(stuck > 100 && late.len() > 3 && by_the_cart > 0.3, "{stuck} {late:?} {by_the_cart}");
+    assert!(late.iter().all(|load| (load - 1.5).abs() < 1e-6), "{late:?}");
+    assert!(loads.iter().all(|(_, load)| *load > 1.5 - 1e-6), "{loads:?}");
 }
 
 #[test]
@@ -373,7 +378,9 @@ fn modes_are_those_of_the_mass_matrix_at_the_cart() {
 #[test]
 fn position_errors_and_stretches_contain_the_yaw() {
     for kind in KINDS {
-        let plain = Plain::of(case(kind, (SOFT, 1.0), ("", "")));
+        let mut case = case(kind, (SOFT, 1.0), ("", ""));
+        case.experiments[0].every = 2e-5;
+        let plain = Plain::of(case);
         let (machine, experiment) = (&plain.case.machine, &plain.case.experiments[0]);
         let mut meter = Meter::new(machine, experiment);
         let rows_of = &mut |_: &taut::trajectory::Trajectory| Flow::Continue;
@@ -385,12 +392,12 @@ fn position_errors_and_stretches_contain_the_yaw() {
         for (span, of) in metrics.spans.iter().enumerate() {
             let want = largest(&|row| plain.stretch(row)[span]);
             let have = of.peak_stretch.value.abs();
-            assert!(have >= want - 1e-9 && have < 1.05 * want, "{kind}: span {span}: {have} m, {want} m at rows");
+            assert!(have >= want - 1e-9 && have < 1.001 * want, "{kind}: span {span}: {have} m, {want} m at rows");
         }
         for (slide, load) in metrics.loads.iter().enumerate() {
             let want = largest(&|row| machine.by_drives(&state(row).position)[slide] - row[p + slide]);
             let have = load.peak_error.value.abs();
-            assert!(have >= want - 1e-9 && have < 1.05 * want, "{kind}: slide {slide}: {have} m, {want} m at rows");
+            assert!(have >= want - 1e-9 && have < 1.001 * want, "{kind}: slide {slide}: {have} m, {want} m at rows");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::rotor::Rotor;
 use super::steady::{Held, Plateau};
-use super::{EventCount, LostSteps, Metrics, OfDrive, OfLoad, OfSpan, Peak, Seek};
+use super::{EventCount, LostSteps, Metrics, OfDrive, OfLoad, OfSpan, OfYaw, Peak, Seek};
 use crate::friction::Motion;
 use crate::machine::{Machine, Stepper};
 use crate::mechanism::{Mechanism, Mode, Shown, State, Status, What};
@@ -37,6 +37,7 @@ struct Places {
     belt_speeds: Vec<Place>,
     shaft_speeds: Vec<Place>,
     currents: Vec<Place>,
+    /// Of the spans, then the yaw of a bridge that yaws.
     stretches: Vec<Place>,
     forces: Vec<Place>,
     sums: Vec<Sum>,
@@ -69,7 +70,8 @@ impl Places {
             read @ Place::Reading(..) => read,
             Place::Sum(_) => summed(geometry.spans[span].by_others, geometry.spans[span].on_yaw),
         });
-        let stretches = stretches.collect();
+        let mut stretches: Vec<Place> = stretches.collect();
+        stretches.extend(yaw.map(|(reading, _)| Place::Reading(reading, 1.0)));
         let belt_speeds: Vec<Place> = match &mechanism.drives[..] {
             [drive] => vec![place(Shown::Speed(drive.pulley, machine.pulley_radius))],
             _ => Vec::new(),
@@ -329,6 +331,10 @@ impl Meter {
             loads: geometry.slides.iter().zip(machine.by_drives(&state.position)).enumerate().map(load).collect(),
             drives: geometry.drives.iter().enumerate().map(drive).collect(),
             spans: (0..geometry.spans.len()).map(span).collect(),
+            yaw: machine.yaw_body().map(|body| OfYaw {
+                angle: state.position[body],
+                peak: peak(places.stretches.get(geometry.spans.len())),
+            }),
             bodies: counts,
             steady_speed: self.plateau.as_ref().and_then(|plateau| plateau.steady_speed(machine)),
             stop_time: last.map(|time| time.max(turned)).filter(|_| settled),

@@ -1,4 +1,5 @@
-//! The nonlinear forces of a mode: of friction laws, and of springs that follow the bodies.
+//! The nonlinear forces of a mode: of friction laws, of springs that follow the bodies, of steppers, and of a cart on a
+//! bridge that yaws.
 
 use super::bristles::{Bent, Bristles, STIFF};
 use super::model::{Curved, Model, Phased, Sliding, Vector};
