@@ -77,6 +77,7 @@ fn gantry(root: &Table, kind: Kind) -> Result<Machine> {
             .fail("this belongs to an axis")
             .next("give the data of the gantry's motors in [motor], such as speed_constant and resistance"));
     }
+    let yaw = yaw(root)?;
     let [bridge, cart] = [slide(root, "bridge")?, slide(root, "cart")?];
     if let Some(field) = belt.optional("follows_cart").filter(|_| belts.follows_cart) {
         for (name, slide) in [("bridge", &bridge), ("cart", &cart)] {
@@ -97,7 +98,7 @@ fn gantry(root: &Table, kind: Kind) -> Result<Machine> {
         drive_pulley: machine::pulley(&pulley)?,
         idler_pulley: Pulley { inertia: 0.0, friction: Friction::default() },
         bridge: Some(bridge),
-        yaw: yaw(root)?,
+        yaw,
         cart,
         belt: belts,
         encoder,
@@ -162,7 +163,8 @@ fn drive(root: &Table, side: &str) -> Result<DriveUnit> {
 fn slide(root: &Table, name: &str) -> Result<Slide> {
     let field = root.required(name, &format!("a table [{name}] with mass"))?.named("bridge");
     let table = field.table()?;
-    table.check_keys(&[], &[])?;
+    // A key of the bridge's table alone.
+    table.check_keys(&[], if name == "cart" { &["yaw"] } else { &[] })?;
     let travel = table.optional("travel").map(|field| machine::travel(&field.table()?)).transpose()?;
     Ok(Slide { travel, ..Slide::new(table.number("mass")?, friction(&table)?) })
 }

@@ -74,8 +74,8 @@ pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Res
     positions.iter().map(place).collect()
 }
 
-/// The diagonal of K⁻¹ at the slides, m/N: K = Σ k a aᵀ over the spans and the bridge's bearings, with their arms a on the bodies that neither
-/// are drive pulleys nor follow one.
+/// The diagonal of K⁻¹ at the slides, m/N: K = Σ k a aᵀ over the spans and the bridge's bearings, with their arms a on
+/// the bodies that neither are drive pulleys nor follow one.
 fn compliance(machine: &Machine) -> Vec<f64> {
     let (geometry, mechanism) = (machine.geometry(), machine.mechanism());
     if machine.belt.model == BeltModel::Rigid {
