@@ -20,6 +20,7 @@ pub const STAGES: &[(&str, &str)] = bundled![
     "h-frame/h-frame.toml",
     "h-frame/follows.toml",
     "h-frame/square.toml",
+    "h-frame/racking.toml",
     "core-xy/core-xy.toml",
     "core-xy/follows.toml",
     "core-xy/square.toml",

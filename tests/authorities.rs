@@ -54,6 +54,7 @@ fn machine(value: &Value) -> Machine {
             ),
         }],
         bridge: None,
+        yaw: None,
         pulley_radius: get("pulley_radius"),
         drive_pulley: pulley("drive_inertia", "drive_friction"),
         cart: Slide::new(get("cart_mass"), friction(&value["cart_friction"])),

@@ -59,6 +59,7 @@ fn gantry() -> impl Strategy<Value = Machine> {
                 drive_pulley,
                 idler_pulley: Pulley { inertia: 0.0, friction: Friction::default() },
                 bridge: Some(bridge),
+                yaw: None,
                 cart,
                 belt: Belt::given(stiffness, damping),
                 encoder: None,

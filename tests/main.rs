@@ -33,6 +33,7 @@ mod gantry_frf;
 mod gantry_laws;
 mod gantry_loops;
 mod gantry_moves;
+mod gantry_yaw;
 mod general;
 mod golden;
 mod hard;

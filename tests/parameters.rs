@@ -77,6 +77,7 @@ friction = { LAW }
 mass = 4
 friction = { LAW }
 travel = { min = -2, max = 8, stop_stiffness = 512, stop_damping = 4 }
+yaw = { inertia = 0.5, belt_spacing = 4, bearing_spacing = 0.25, bearing_stiffness = 1048576, bearing_damping = 64 }
 [cart]
 mass = 2
 friction = { LAW }

@@ -40,6 +40,8 @@ pub struct Machine {
     pub idler_pulley: Pulley,
     /// The bridge of a gantry; its position is x.
     pub bridge: Option<Slide>,
+    /// Yaw of the bridge on its bearings; none for a bridge that only slides.
+    pub yaw: Option<Yaw>,
     /// The cart; its position is x on an axis (the paper's x₂′), y on a gantry's bridge.
     pub cart: Slide,
     /// The belt, or belts.
@@ -125,6 +127,7 @@ impl Machine {
             && self.slides().all(|slide| slide.along.is_none())
             && !follows
             && self.stepper().is_none()
+            && self.yaw.is_none()
     }
 
     /// True if its parameters change along the travel, apart from the ends.
@@ -178,6 +181,41 @@ pub struct Slide {
     pub inclination: f64,
     /// Travel, if it is limited.
     pub travel: Option<Travel>,
+}
+
+/// Yaw of a bridge on its bearings (racking).
+///
+/// Two bearings, one behind the other along the travel, hold the bridge across it. With four, on two rails, take twice
+/// the stiffness and damping of one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Yaw {
+    /// Moment of inertia I of the bridge without the cart about a vertical axis through its middle, kg m².
+    pub inertia: f64,
+    /// Distance 2 a of the belts on either side, m.
+    pub belt_spacing: f64,
+    /// Distance s of the bearings along the travel, m.
+    pub bearing_spacing: f64,
+    /// Stiffness k_b of each bearing across the travel, N/m.
+    pub bearing_stiffness: f64,
+    /// Damping c_b of each, N s/m.
+    pub bearing_damping: f64,
+}
+
+impl Yaw {
+    /// a, m.
+    pub fn arm(&self) -> f64 {
+        0.5 * self.belt_spacing
+    }
+
+    /// Yaw stiffness, N m/rad: two bearings at s/2 from the middle, 2 k_b (s/2)².
+    pub fn stiffness(&self) -> f64 {
+        0.5 * self.bearing_stiffness * self.bearing_spacing * self.bearing_spacing
+    }
+
+    /// Yaw damping, N m s/rad: c_b s²/2.
+    pub fn damping(&self) -> f64 {
+        0.5 * self.bearing_damping * self.bearing_spacing * self.bearing_spacing
+    }
 }
 
 /// Forces that do not depend on the direction of motion, N over m and over m/s, positive towards larger x: of a cable

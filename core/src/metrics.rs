@@ -29,6 +29,8 @@ pub struct Metrics {
     pub drives: Vec<OfDrive>,
     /// The spans of the belt, in the order of [`Geometry::spans`](crate::machine::Geometry).
     pub spans: Vec<OfSpan>,
+    /// Yaw of the bridge, if it yaws.
+    pub yaw: Option<OfYaw>,
     /// Events of each body other than rotors.
     pub bodies: Vec<EventCount>,
     /// Steady speed of the cart under constant input; none if no non-zero input lasts a fiftieth of the run, if the run
@@ -46,6 +48,15 @@ pub struct Metrics {
     /// True if no rotor turns at the end, with a threshold of a millionth of its largest speed for a compliant gear.
     /// Always true for stiff gears, whose rotors are part of their pulleys.
     pub rotors_rest: bool,
+}
+
+/// Yaw of a bridge.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OfYaw {
+    /// At the end, rad.
+    pub angle: f64,
+    /// The largest, rad.
+    pub peak: Peak,
 }
 
 /// Steps that a stepper lost.

@@ -328,10 +328,13 @@ fn curved(mechanism: &Mechanism) -> Error {
         }
         (Some(body), _) => format!("the friction of the {} is a curve", body.label.name),
         (None, Some(spring)) => format!("the stiffness of {} follows the cart", spring.label.name),
+        (None, None) if mechanism.ride.is_some() => {
+            "the bridge yaws, and its inertia depends on where the cart is".to_string()
+        }
         (None, None) => "this machine is not linear between its events".to_string(),
     };
     Error::new(format!("{what}; this export requires a machine that is linear between its events"))
-        .allowed("Coulomb friction with or without a breakaway (`coulomb`, `static`), and spans of constant stiffness")
+        .allowed("Coulomb friction with or without a breakaway (`coulomb`, `static`), spans of constant stiffness, and no [bridge.yaw]")
         .next("`taut export fmu` takes it as it is")
 }
 

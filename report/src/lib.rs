@@ -74,6 +74,10 @@ pub fn drawn(page: &mut Page, machine: &taut::machine::Machine) -> String {
     let drawing = machine_drawing(machine);
     let caption = match machine.bridge.is_some() {
         false => "Symbols, values and positive directions.",
+        true if machine.yaw.is_some() => {
+            "In plan view with positive directions; lengths are not to scale. The bridge yaws on its bearings, positive if \
+             its right end leads; idlers have neither inertia nor friction."
+        }
         true => {
             "In plan view with positive directions; lengths are not to scale. In the model the bridge does not yaw, and \
              idlers have neither inertia nor friction."

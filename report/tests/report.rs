@@ -29,6 +29,7 @@ fn machine(encoder: Option<Encoder>) -> Machine {
             amplifier: Amplifier::ideal(AmplifierMode::Voltage, 2.0),
         }],
         bridge: None,
+        yaw: None,
         pulley_radius: 0.0194,
         drive_pulley: pulley,
         cart: Slide::new(0.362, Friction::symmetric(19.0424, 0.2)),

@@ -392,6 +392,10 @@ pub fn figures(metrics: &Metrics, machine: &Machine) -> Value {
         }
     }
     let counts = geometry.bodies.iter().zip(&metrics.bodies).map(|(body, count)| CountTold::of(body.label.key, *count));
+    if let Some(yaw) = metrics.yaw {
+        told.insert("final_yaw_rad".into(), json!(yaw.angle));
+        told.insert("peak_yaw_rad".into(), super::peak(yaw.peak));
+    }
     told.insert("event_counts".into(), json!(counts.collect::<Vec<_>>()));
     Value::Object(told)
 }

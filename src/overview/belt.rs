@@ -25,8 +25,8 @@ fn along(machine: &Machine) -> Vec<Vec<f64>> {
         let along = linear::places(machine, PLACES).unwrap_or_else(|| vec![0.0]);
         return along.into_iter().map(|x| vec![x]).collect();
     }
-    let (Some(_), Some(x), Some(y)) = (machine.belt.following(), machine.first_slide().travel, machine.cart.travel)
-    else {
+    let changes = machine.belt.following().is_some() || machine.yaw.is_some();
+    let (true, Some(x), Some(y)) = (changes, machine.first_slide().travel, machine.cart.travel) else {
         return vec![vec![0.0, 0.0]];
     };
     let middle = |travel: Travel| 0.5 * (travel.min + travel.max);

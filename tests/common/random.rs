@@ -96,6 +96,7 @@ pub fn machine(dry: Dry) -> impl Strategy<Value = Machine> {
             kind: Kind::Axis,
             drives: vec![DriveUnit { motor, amplifier }],
             bridge: None,
+            yaw: None,
             pulley_radius,
             drive_pulley,
             cart,

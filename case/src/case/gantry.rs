@@ -6,7 +6,7 @@ use super::{input, machine, sheet, stepper};
 use crate::error::{Error, Result};
 use crate::friction::Friction;
 use crate::machine::{
-    Belt, BeltMake, BeltSheet, DriveAt, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans,
+    Belt, BeltMake, BeltSheet, DriveAt, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans, Yaw,
 };
 use crate::mechanism::{STEPPERS, State};
 use crate::signal::Signal;
@@ -77,6 +77,7 @@ fn gantry(root: &Table, kind: Kind) -> Result<Machine> {
             .fail("this belongs to an axis")
             .next("give the data of the gantry's motors in [motor], such as speed_constant and resistance"));
     }
+    let yaw = yaw(root)?;
     let [bridge, cart] = [slide(root, "bridge")?, slide(root, "cart")?];
     if let Some(field) = belt.optional("follows_cart").filter(|_| belts.follows_cart) {
         for (name, slide) in [("bridge", &bridge), ("cart", &cart)] {
@@ -97,6 +98,7 @@ fn gantry(root: &Table, kind: Kind) -> Result<Machine> {
         drive_pulley: machine::pulley(&pulley)?,
         idler_pulley: Pulley { inertia: 0.0, friction: Friction::default() },
         bridge: Some(bridge),
+        yaw,
         cart,
         belt: belts,
         encoder,
@@ -161,9 +163,28 @@ fn drive(root: &Table, side: &str) -> Result<DriveUnit> {
 fn slide(root: &Table, name: &str) -> Result<Slide> {
     let field = root.required(name, &format!("a table [{name}] with mass"))?.named("bridge");
     let table = field.table()?;
-    table.check_keys(&[], &[])?;
+    // A key of the bridge's table alone.
+    table.check_keys(&[], if name == "cart" { &["yaw"] } else { &[] })?;
     let travel = table.optional("travel").map(|field| machine::travel(&field.table()?)).transpose()?;
     Ok(Slide { travel, ..Slide::new(table.number("mass")?, friction(&table)?) })
+}
+
+/// Yaw of the bridge, if the file describes it.
+fn yaw(root: &Table) -> Result<Option<Yaw>> {
+    let of = |name: &str| root.optional(name).map(|field| field.named("bridge").table()).transpose();
+    if let Some(field) = of("cart")?.and_then(|cart| cart.optional("yaw")) {
+        return Err(field.fail("only the bridge yaws").next("move it to [bridge.yaw]"));
+    }
+    let Some(field) = of("bridge")?.and_then(|bridge| bridge.optional("yaw")) else { return Ok(None) };
+    let table = field.table()?;
+    table.check_keys(&[], &[])?;
+    Ok(Some(Yaw {
+        inertia: table.number("inertia")?,
+        belt_spacing: table.number("belt_spacing")?,
+        bearing_spacing: table.number("bearing_spacing")?,
+        bearing_stiffness: table.number("bearing_stiffness")?,
+        bearing_damping: table.number("bearing_damping")?,
+    }))
 }
 
 fn belts(table: &Table, kind: Kind) -> Result<Belt> {

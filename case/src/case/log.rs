@@ -158,6 +158,12 @@ fn outputs(field: &Field, table: &Table, sources: &Sources) -> Result<Vec<(Quant
                 .fail("a rigid belt has no force at the cart, from which its acceleration would be computed")
                 .next("write model = \"elastic\" in [belt], or leave the accelerometer out"));
         }
+        if quantity.is_acceleration() && sources.machine.yaw.is_some() && sources.is_named(quantity.name()) {
+            let field = table.optional(quantity.name()).unwrap_or_else(|| field.clone());
+            return Err(field
+                .fail("accelerations of a gantry whose bridge yaws cannot be compared yet")
+                .next("leave the accelerometer out, or [bridge.yaw]"));
+        }
         outputs.extend(sources.source(quantity.name(), quantity.unit())?.map(|source| (quantity, source)));
     }
     if outputs.is_empty() {

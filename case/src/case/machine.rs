@@ -38,6 +38,7 @@ pub(super) fn machine(root: &Table) -> Result<Machine> {
         pulley_radius,
         drive_pulley: pulley(&drive)?,
         bridge: None,
+        yaw: None,
         cart: Slide {
             mass: cart.number("mass")?,
             friction: friction(&cart)?,

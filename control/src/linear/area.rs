@@ -19,9 +19,10 @@ pub struct ResonanceMap {
 }
 
 impl ResonanceMap {
-    /// Map of a machine with a bridge, if its spans follow bridge and cart and both have a travel.
+    /// Map of a machine with a bridge, if its spans follow bridge and cart, or the bridge yaws, and both have a travel.
     pub fn of(machine: &Machine) -> Result<Option<Self>> {
-        let bridge = machine.bridge.as_ref().filter(|_| machine.belt.following().is_some());
+        let changes = machine.belt.following().is_some() || machine.yaw.is_some();
+        let bridge = machine.bridge.as_ref().filter(|_| changes);
         let (Some(bridge), Some(cart)) = (bridge.and_then(|bridge| bridge.travel), machine.cart.travel) else {
             return Ok(None);
         };

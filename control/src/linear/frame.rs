@@ -85,9 +85,10 @@ pub(super) fn gears(plant: &Mechanism) -> impl Iterator<Item = usize> + '_ {
     (0..plant.springs.len()).filter(is_gear)
 }
 
-/// The pulleys, each with the first span between it and slides only.
+/// The pulleys, each with the first span between it and slides only, or a bridge that yaws.
 fn pulleys(machine: &Machine, plant: &Mechanism) -> Vec<(usize, usize)> {
-    let slides = |body: usize| plant.bodies[body].kind == mechanism::Kind::Linear;
+    let yaws = |body: usize| plant.ride.is_some_and(|ride| ride.yaw == body);
+    let slides = |body: usize| plant.bodies[body].kind == mechanism::Kind::Linear || yaws(body);
     let turning = plant.held_bodies().filter(|body| !slides(*body));
     let own = |body: usize| {
         let hangs = |span: &usize| {
@@ -123,6 +124,7 @@ impl Frame {
             return Self::outer(machine, plant, held, speed);
         }
         let mut kinds: Vec<Kind> = machine.geometry().slides.iter().map(|slide| Kind::Angle(slide.body)).collect();
+        kinds.extend(plant.ride.map(|ride| Kind::Angle(ride.yaw)));
         let of_pulleys = pulleys(machine, plant).into_iter().filter(|(body, _)| plant.leader(*body) == *body);
         kinds.extend(of_pulleys.map(|(_, span)| Kind::Stretch(span)));
         kinds.extend(gears(plant).map(Kind::Stretch));
@@ -173,7 +175,12 @@ impl Frame {
             let spans = machine.geometry().spans;
             for (span, at) in spans.iter().enumerate().filter(|(span, _)| !pulleys.iter().any(|own| own.1 == *span)) {
                 let others = at.by_others.iter();
-                stretch[span] = others.fold(DVector::zeros(n), |sum, &(other, weight)| sum + &stretch[other] * weight);
+                let mut sum = others.fold(DVector::zeros(n), |sum, &(other, weight)| sum + &stretch[other] * weight);
+                if let Some((yaw, ride)) = machine.yaw.zip(plant.ride) {
+                    let left = machine.geometry().left_to_yaw(at.on_yaw, at.by_others);
+                    sum += &ways[ride.yaw] * (yaw.arm() * left);
+                }
+                stretch[span] = sum;
             }
             for gear in gears(plant) {
                 let rotor = plant.springs[gear].arms.iter().find(|(body, _)| plant.bodies[*body].is_rotor);

@@ -372,7 +372,30 @@ impl Linear<'_> {
             }
             put(&mut a, place, (row, input));
         }
+        self.ride(frame, &mut a, &mut b);
         (a, b)
+    }
+
+    /// Couples the accelerations of bridge and yaw by the cart, for a bridge without yaw about the cart's position y.
+    fn ride(&self, frame: &Frame, a: &mut DMatrix<f64>, b: &mut DMatrix<f64>) {
+        let Some(ride) = self.plant.ride else { return };
+        let Some(yaw) = frame.speed_place[ride.yaw] else { return };
+        let bridge = frame.speed_place[ride.bridge];
+        let inertia = |body: usize| self.plant.bodies[body].inertia;
+        let (m, whole, turned, y) =
+            (inertia(ride.cart), inertia(ride.bridge), inertia(ride.yaw), self.operation.position);
+        // M ẍ + m y ψ̈ = M a_x, (I + m y²) ψ̈ + m y ẍ = I a_ψ; a bridge that is held does not accelerate.
+        let free = if bridge.is_some() { m / whole } else { 0.0 };
+        let whole_turned = turned + m * y * y * (1.0 - free);
+        for matrix in [a, b] {
+            let of_yaw = matrix.row(yaw) * (turned / whole_turned);
+            let of_bridge = bridge.map_or_else(|| of_yaw.clone() * 0.0, |bridge| matrix.row(bridge) * 1.0);
+            let turning = of_yaw - &of_bridge * (m * y / whole_turned);
+            if let Some(bridge) = bridge {
+                matrix.set_row(bridge, &(of_bridge - &turning * (m * y / whole)));
+            }
+            matrix.set_row(yaw, &turning);
+        }
     }
 
     /// True if a body is held.

@@ -4,9 +4,10 @@
 //! M q̈ + C q̇ + K q = 0,   K = Aᵀ diag(k) A,   C = Aᵀ diag(c) A + B + n² K_t K_e / R
 //! ```
 //!
-//! over the independent bodies; A has a row for each stepper, whose field is a spring to its commanded angle. Undamped
-//! modes are the eigenvectors of M^(−½) K M^(−½); the number of rigid ones, whose frequency is zero by construction, is
-//! the dimension of the null space of A.
+//! over the independent bodies; A has a row for each stepper, whose field is a spring to its commanded angle. M is
+//! diagonal, except that a cart on a bridge that yaws adds m y to bridge and yaw and m y² to the yaw. Undamped modes are
+//! the eigenvectors of M^(−½) K M^(−½), or of L⁻¹ K L⁻ᵀ with M = L Lᵀ; the number of rigid ones, whose frequency is zero
+//! by construction, is the dimension of the null space of A.
 
 use super::{Root, eigen};
 use crate::error::{Error, Result};
@@ -73,6 +74,8 @@ struct Matrices {
     bodies: Vec<usize>,
     /// Diagonal of M.
     mass: DVector<f64>,
+    /// What is added to it: (row, column, value), of a cart that rides on a bridge that yaws.
+    coupled: Vec<(usize, usize, f64)>,
     stiffness: DMatrix<f64>,
     damping: DMatrix<f64>,
     /// Number of motions that no spring restrains.
@@ -95,9 +98,15 @@ impl Natural {
     pub fn of(mechanism: &Mechanism, position: &[f64; BODIES]) -> Result<Self> {
         let matrices = Matrices::of(mechanism, position);
         let (values, vectors) = matrices.modes()?;
-        let Matrices { bodies, mass, damping, free, .. } = matrices;
         // q = Φ η with Φᵀ M Φ = 1, rigid modes first.
-        let shapes = DMatrix::from_fn(bodies.len(), bodies.len(), |i, j| vectors[(i, j)] / mass[i].sqrt());
+        let shapes = matrices.shapes(&vectors)?;
+        let moved = matrices.mass() * &shapes;
+        let Matrices { bodies, coupled, damping, free, .. } = matrices;
+        // The share of a body of ½ q̇ᵀ M q̇, with half of what it has in common with another.
+        let energy = |i: usize, k: usize| match coupled.is_empty() {
+            true => vectors[(i, k)].powi(2),
+            false => shapes[(i, k)] * moved[(i, k)],
+        };
         let poles = poles(&values, &(shapes.transpose() * damping * &shapes), free)?;
         let pairs: Vec<Root> = poles.iter().filter(|root| matches!(root, Root::Pair { .. })).copied().collect();
         let is_complete = pairs.len() == values.len() - free;
@@ -114,7 +123,7 @@ impl Natural {
                     frequency: values[k].sqrt(),
                     damped: is_complete.then(|| pairs[k - free]),
                     shape: ways.iter().map(share).collect(),
-                    energy: (0..bodies.len()).map(|i| vectors[(i, k)].powi(2)).collect(),
+                    energy: (0..bodies.len()).map(|i| energy(i, k)).collect(),
                 }
             })
             .collect();
@@ -185,6 +194,7 @@ impl Matrices {
             rows.push(row);
         }
         let mass = DVector::from_iterator(n, bodies.iter().map(mass));
+        let coupled = mechanism.ridden_mass(&bodies, position);
         // Number of independent rows, with displacements measured at the belt.
         let rank = if rows.is_empty() {
             0
@@ -194,24 +204,56 @@ impl Matrices {
             let values = a.singular_values();
             values.iter().filter(|value| **value > NOTHING * values.max()).count()
         };
-        Self { free: n - rank, bodies, mass, stiffness, damping }
+        Self { free: n - rank, bodies, mass, coupled, stiffness, damping }
+    }
+
+    /// M.
+    fn mass(&self) -> DMatrix<f64> {
+        let mut mass = DMatrix::from_diagonal(&self.mass);
+        self.coupled.iter().for_each(|&(i, j, own)| mass[(i, j)] += own);
+        mass
+    }
+
+    /// L⁻¹ X with M = L Lᵀ.
+    fn solved(&self, x: &DMatrix<f64>) -> Result<DMatrix<f64>> {
+        let lower = self.mass().cholesky().map(|parts| parts.l());
+        lower.and_then(|lower| lower.solve_lower_triangular(x)).ok_or_else(no_modes)
+    }
+
+    /// Displacements of the modes with these eigenvectors: M^(−½) v, or L⁻ᵀ v.
+    fn shapes(&self, vectors: &DMatrix<f64>) -> Result<DMatrix<f64>> {
+        let n = self.bodies.len();
+        match self.coupled.is_empty() {
+            true => Ok(DMatrix::from_fn(n, n, |i, j| vectors[(i, j)] / self.mass[i].sqrt())),
+            false => Ok(self.solved(&DMatrix::identity(n, n))?.transpose() * vectors),
+        }
     }
 
     /// Eigenvalues of M^(−½) K M^(−½) in ascending order, zero for rigid modes, and its eigenvectors.
     fn modes(&self) -> Result<(Vec<f64>, DMatrix<f64>)> {
         let n = self.bodies.len();
         let root = self.mass.map(f64::sqrt);
-        let scaled = DMatrix::from_fn(n, n, |i, j| self.stiffness[(i, j)] / (root[i] * root[j]));
-        let eigen = SymmetricEigen::try_new(scaled, f64::EPSILON, 10_000).ok_or_else(|| {
-            Error::new("the natural modes cannot be found: the iteration does not settle")
-                .next("check the units of stiffness and inertia")
-        })?;
+        let scaled = match self.coupled.is_empty() {
+            true => DMatrix::from_fn(n, n, |i, j| self.stiffness[(i, j)] / (root[i] * root[j])),
+            false => {
+                // L⁻¹ K L⁻ᵀ with M = L Lᵀ, made symmetric to the last bit
+                let half = self.solved(&self.stiffness)?.transpose();
+                let whole = self.solved(&half)?;
+                (&whole + whole.transpose()) * 0.5
+            }
+        };
+        let eigen = SymmetricEigen::try_new(scaled, f64::EPSILON, 10_000).ok_or_else(no_modes)?;
         let mut order: Vec<usize> = (0..n).collect();
         order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
         let value = |(k, &index): (usize, &usize)| if k < self.free { 0.0 } else { eigen.eigenvalues[index].max(0.0) };
         let values = order.iter().enumerate().map(value).collect();
         Ok((values, DMatrix::from_fn(n, n, |i, k| eigen.eigenvectors[(i, order[k])])))
     }
+}
+
+fn no_modes() -> Error {
+    Error::new("the natural modes cannot be found: the iteration does not settle")
+        .next("check the units of stiffness and inertia")
 }
 
 /// Poles of η̈ + Ĉ η̇ + Ω² η = 0 of which the first `free` have no stiffness.

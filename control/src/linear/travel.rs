@@ -74,8 +74,8 @@ pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Res
     positions.iter().map(place).collect()
 }
 
-/// The diagonal of K⁻¹ at the slides, m/N: K = Σ k a aᵀ over the spans, with their arms a on the bodies that neither
-/// are drive pulleys nor follow one.
+/// The diagonal of K⁻¹ at the slides, m/N: K = Σ k a aᵀ over the spans and the bridge's bearings, with their arms a on
+/// the bodies that neither are drive pulleys nor follow one.
 fn compliance(machine: &Machine) -> Vec<f64> {
     let (geometry, mechanism) = (machine.geometry(), machine.mechanism());
     if machine.belt.model == BeltModel::Rigid {
@@ -83,9 +83,9 @@ fn compliance(machine: &Machine) -> Vec<f64> {
     }
     let is_held = |body: usize| geometry.drives.iter().any(|drive| mechanism.leader(drive.pulley) == body);
     let free: Vec<usize> =
-        (0..geometry.bodies.len()).filter(|&body| mechanism.leader(body) == body && !is_held(body)).collect();
+        mechanism.held_bodies().filter(|&body| mechanism.leader(body) == body && !is_held(body)).collect();
     let mut stiffness = DMatrix::zeros(free.len(), free.len());
-    for &span in &mechanism.roles.spans {
+    for &span in mechanism.roles.spans.iter().chain(&machine.yaw_spring()) {
         let arms = mechanism.leading_arms(span);
         let arms = DVector::from_iterator(free.len(), free.iter().map(|body| arms[*body]));
         stiffness.ger(mechanism.springs[span].stiffness, &arms, &arms, 1.0);
@@ -113,6 +113,9 @@ pub fn undamped(machine: &Machine) -> Machine {
         (slide.friction, slide.along, slide.forces) = (none, None, SlideForces::default());
     }
     bare.belt.damping = bare.belt.damping.map(|_| 0.0);
+    if let Some(yaw) = &mut bare.yaw {
+        yaw.bearing_damping = 0.0;
+    }
     for unit in &mut bare.drives {
         if let Some(play) = &mut unit.motor.gear_play {
             play.damping = 0.0;

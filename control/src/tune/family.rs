@@ -451,7 +451,8 @@ fn along(case: &Case, count: usize) -> [Vec<f64>; 2] {
         (low <= high).then(|| evenly(low, high))
     };
     if machine.bridge.is_some() {
-        let of_slide = |slide| of_moves(slide).filter(|_| machine.belt.follows_cart).unwrap_or(vec![0.0]);
+        let changes = machine.belt.follows_cart || machine.yaw.is_some();
+        let of_slide = |slide| of_moves(slide).filter(|_| changes).unwrap_or(vec![0.0]);
         return [of_slide(0), of_slide(1)];
     }
     let Some(whole) = places(&machine, count) else { return [Vec::new(), vec![0.0]] };

@@ -4,7 +4,8 @@
 //! the cart on it. The left and right motor are fixed in front; each belt runs from its motor to an idler at the far
 //! end and back, and the bridge is clamped to the strand that comes back. The cart's motor is mounted on the left end
 //! of the bridge and moves with it, so only motion of the cart strains its belt, and `bridge.mass` contains it. Idlers
-//! have neither inertia nor friction, and the bridge does not yaw. Rows of A, one a span:
+//! have neither inertia nor friction. Rows of A, one a span, with x − a ψ on the left and x + a ψ on the right for a
+//! bridge that yaws:
 //!
 //! ```text
 //!              φ₁   φ₂   φ₃   x    y
@@ -39,11 +40,12 @@ const CART_DRIVE: DriveAt = drive!("cart", CART_PULLEY);
 /// A span of the belt on this side, between its drive pulley and the slide. `sign` is 1 if forward motion of the pulley
 /// stretches it; `out` is the number of the outgoing span.
 macro_rules! span {
-    ($side:literal, $way:literal, ($pulley:expr, $slide:expr), sign = $sign:literal, out = $out:literal) => {
+    ($side:literal, $way:literal, ($pulley:expr, $slide:expr), sign = $sign:literal, yaw = $yaw:literal, out = $out:literal) => {
         SpanAt {
             label: Label { key: concat!($side, "_", $way, "_span"), name: concat!($side, " ", $way, " span") },
             column: concat!($side, "_", $way, "_span"),
             arms: &[($pulley, Radius($sign)), ($slide, One(-$sign))],
+            on_yaw: $yaw,
             follows: &[($slide, -$sign)],
             by_others: &[($out, $sign)],
         }
@@ -67,12 +69,12 @@ pub(super) static DUAL_BELT: Geometry = Geometry {
         BodyAt { label: Label { key: "cart", name: "cart" }, part: Part::Cart, by_slides: &[0.0, 1.0] },
     ],
     spans: &[
-        span!("left", "out", (LEFT, BRIDGE), sign = 1.0, out = 0),
-        span!("left", "back", (LEFT, BRIDGE), sign = -1.0, out = 0),
-        span!("right", "out", (RIGHT, BRIDGE), sign = 1.0, out = 2),
-        span!("right", "back", (RIGHT, BRIDGE), sign = -1.0, out = 2),
-        span!("cart", "out", (CART_PULLEY, CART), sign = 1.0, out = 4),
-        span!("cart", "back", (CART_PULLEY, CART), sign = -1.0, out = 4),
+        span!("left", "out", (LEFT, BRIDGE), sign = 1.0, yaw = 1.0, out = 0),
+        span!("left", "back", (LEFT, BRIDGE), sign = -1.0, yaw = -1.0, out = 0),
+        span!("right", "out", (RIGHT, BRIDGE), sign = 1.0, yaw = -1.0, out = 2),
+        span!("right", "back", (RIGHT, BRIDGE), sign = -1.0, yaw = 1.0, out = 2),
+        span!("cart", "out", (CART_PULLEY, CART), sign = 1.0, yaw = 0.0, out = 4),
+        span!("cart", "back", (CART_PULLEY, CART), sign = -1.0, yaw = 0.0, out = 4),
     ],
     slides: &[bridge(BRIDGE, &[0.5, 0.5, 0.0], &[(0, 0.5), (2, 0.5)]), cart(CART, &[0.0, 0.0, 1.0], &[(4, 1.0)])],
 };

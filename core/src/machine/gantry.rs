@@ -1,7 +1,7 @@
 //! Geometries of two motors and belts that move a cart in a plane: the H-frame, and CoreXY.
 //!
 //! Coordinates are φ₁, φ₂ of the drive pulleys (left and right; A and B of CoreXY), x of the bridge and y of the cart
-//! on it. Idlers have neither inertia nor friction, and the bridge does not yaw. Rows of A, one a span:
+//! on it. Idlers have neither inertia nor friction. Rows of A, one a span:
 //!
 //! ```text
 //!  H-frame   φ₁   φ₂    x    y        CoreXY    φ_A  φ_B   x    y
@@ -10,6 +10,10 @@
 //!  back    ( −r    r   −2      )      B out   (       r  −1    1 )
 //!                                     B back  (      −r   1   −1 )
 //! ```
+//!
+//! A bridge that yaws by ψ has its left end at x − a ψ and its right one at x + a ψ, a being half the distance of the
+//! belts. A strand that pulls the cart to the left runs along the bridge to an idler at its left end, so that left has x
+//! − a ψ, right x + a ψ, back both; A out and B back, which pull to the right, have x + a ψ, A back and B out x − a ψ.
 //!
 //! T = ½ J₁ φ̇₁² + ½ J₂ φ̇₂² + ½ (m_bridge + m_cart) ẋ² + ½ m_cart ẏ²: the cart rides along with the bridge.
 //! Sollmann, Jouaneh and Lavender, IEEE/ASME Transactions on Mechatronics 15(2), 2010, eq. (12)-(20), for the H-frame.
@@ -93,6 +97,7 @@ pub(super) static H_FRAME: Geometry = Geometry {
             label: Label { key: "left_span", name: "left span" },
             column: "left_span",
             arms: &[(LEFT, Radius(1.0)), (BRIDGE, One(1.0)), (CART, One(1.0))],
+            on_yaw: -1.0,
             follows: &[(BRIDGE, 1.0), (CART, 1.0)],
             by_others: &[(0, 1.0)],
         },
@@ -100,6 +105,7 @@ pub(super) static H_FRAME: Geometry = Geometry {
             label: Label { key: "right_span", name: "right span" },
             column: "right_span",
             arms: &[(RIGHT, Radius(-1.0)), (BRIDGE, One(1.0)), (CART, One(-1.0))],
+            on_yaw: 1.0,
             follows: &[(BRIDGE, 1.0), (CART, -1.0)],
             by_others: &[(1, 1.0)],
         },
@@ -107,6 +113,7 @@ pub(super) static H_FRAME: Geometry = Geometry {
             label: Label { key: "back_span", name: "back span" },
             column: "back_span",
             arms: &[(LEFT, Radius(-1.0)), (RIGHT, Radius(1.0)), (BRIDGE, One(-2.0))],
+            on_yaw: 0.0,
             follows: &[(BRIDGE, -2.0)],
             by_others: &[(0, -1.0), (1, -1.0)],
         },
@@ -125,6 +132,7 @@ pub(super) static CORE_XY: Geometry = Geometry {
             label: Label { key: "a_out_span", name: "A out span" },
             column: "a_out_span",
             arms: &[(LEFT, Radius(1.0)), (BRIDGE, One(-1.0)), (CART, One(-1.0))],
+            on_yaw: -1.0,
             follows: &[(BRIDGE, -1.0), (CART, -1.0)],
             by_others: &[(0, 1.0)],
         },
@@ -132,6 +140,7 @@ pub(super) static CORE_XY: Geometry = Geometry {
             label: Label { key: "a_back_span", name: "A back span" },
             column: "a_back_span",
             arms: &[(LEFT, Radius(-1.0)), (BRIDGE, One(1.0)), (CART, One(1.0))],
+            on_yaw: -1.0,
             follows: &[(BRIDGE, 1.0), (CART, 1.0)],
             by_others: &[(0, -1.0)],
         },
@@ -139,6 +148,7 @@ pub(super) static CORE_XY: Geometry = Geometry {
             label: Label { key: "b_out_span", name: "B out span" },
             column: "b_out_span",
             arms: &[(RIGHT, Radius(1.0)), (BRIDGE, One(-1.0)), (CART, One(1.0))],
+            on_yaw: 1.0,
             follows: &[(BRIDGE, -1.0), (CART, 1.0)],
             by_others: &[(2, 1.0)],
         },
@@ -146,6 +156,7 @@ pub(super) static CORE_XY: Geometry = Geometry {
             label: Label { key: "b_back_span", name: "B back span" },
             column: "b_back_span",
             arms: &[(RIGHT, Radius(-1.0)), (BRIDGE, One(1.0)), (CART, One(-1.0))],
+            on_yaw: 1.0,
             follows: &[(BRIDGE, 1.0), (CART, -1.0)],
             by_others: &[(2, -1.0)],
         },

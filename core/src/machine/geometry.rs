@@ -98,9 +98,12 @@ pub struct SpanAt {
     pub column: &'static str,
     /// Elongation per displacement of each body.
     pub arms: &'static [(usize, Lever)],
+    /// Its elongation per displacement a ψ of the bridge's right end by yaw, with ψ the yaw and a half the distance of
+    /// the belts: the way of the end that it hangs on.
+    pub on_yaw: f64,
     /// Change of its length from end to end per displacement of each slide; empty if its ends are fixed.
     pub follows: &'static [(usize, f64)],
-    /// Its elongation as a sum over those of `Geometry::telling_spans`: the spans of a belt add up to zero.
+    /// Its elongation as a sum over those of `Geometry::telling_spans`, without yaw: the spans of a belt add up to zero.
     pub by_others: &'static [(usize, f64)],
 }
 
@@ -136,7 +139,7 @@ pub struct SlideAt {
     pub force_by_speed: Label,
     /// Its position by the drives as a weighted sum over r φ of their pulleys.
     pub by_drives: &'static [f64],
-    /// Position by the drives minus true position, as a sum over span elongations: (span, weight).
+    /// Position by the drives minus true position, without yaw, as a sum over span elongations: (span, weight).
     pub error: &'static [(usize, f64)],
 }
 
@@ -182,6 +185,11 @@ impl Geometry {
             pulleys.peek().is_some() && pulleys.all(|pulley| pulley == own)
         };
         self.spans.iter().enumerate().filter(move |(_, span)| is_own(span)).map(|(index, _)| index)
+    }
+
+    /// What yaw adds to a sum over span elongations that is `own` per a ψ: those of the spans are taken off.
+    pub fn left_to_yaw(&self, own: f64, sum: &[(usize, f64)]) -> f64 {
+        own - sum.iter().map(|&(span, weight)| weight * self.spans[span].on_yaw).sum::<f64>()
     }
 
     /// Spans whose elongations determine the position errors of all drives and the elongations of all other spans.

@@ -2,14 +2,19 @@
 //! without strain.
 
 use super::{
-    BeltMake, BeltModel, BodyAt, DriveAt, EncoderPlace, Geometry, Machine, Part, Slide, SlideAt, SpanAt, Spans, Travel,
+    BeltMake, BeltModel, BodyAt, DriveAt, EncoderPlace, GRAVITY, Geometry, Machine, Part, Slide, SlideAt, SpanAt,
+    Spans, Travel,
 };
 use crate::error::{Error, Result};
 use crate::friction::{Friction, Law};
 use crate::mechanism::{
-    self, BODIES, BODIES_AND_DRIVES, Body, Drive, Follows, Heading, Label, Mechanism, Over, Roles, SPRINGS, Shown,
-    Spring, SpringLaw, State,
+    self, BODIES, BODIES_AND_DRIVES, Body, Drive, Follows, Heading, Label, Mechanism, Over, Ride, Roles, SPRINGS,
+    Shown, Spring, SpringLaw, State,
 };
+
+/// The yaw of a bridge, as a body and as what its bearings hold.
+const YAW: Label = Label { key: "yaw", name: "yaw of the bridge" };
+const BEARINGS: Label = Label { key: "bearings", name: "bearings of the bridge" };
 
 impl Machine {
     /// Its geometry.
@@ -21,6 +26,7 @@ impl Machine {
     pub fn mechanism(&self) -> Mechanism {
         let geometry = self.geometry();
         let (mut bodies, mut springs, mut drives) = (self.bodies(), self.spans(), Vec::new());
+        springs.extend(self.bearings());
         for (at, unit) in geometry.drives.iter().zip(&self.drives) {
             let mut shaft = at.pulley;
             if let Some(play) = unit.motor.gear_play {
@@ -66,6 +72,7 @@ impl Machine {
         springs.extend(slides().map(|(at, slide)| way(at, slide)));
         let mut mechanism = Mechanism::new(bodies, springs, drives);
         let loads = geometry.slides.iter().map(|slide| slide.body).collect();
+        mechanism.ride = self.ride();
         mechanism.roles = Roles { loads, spans: (0..geometry.spans.len()).collect() };
         mechanism.readings = self.readings(&mechanism);
         mechanism.columns = self.columns(&mechanism);
@@ -105,7 +112,52 @@ impl Machine {
                 is_rotor: false,
             }
         };
-        bodies.iter().enumerate().map(body).collect()
+        let yaw = self.yaw.iter().map(|yaw| Body {
+            label: YAW,
+            kind: mechanism::Kind::Rotary { radius: yaw.arm() },
+            inertia: yaw.inertia,
+            friction: Friction::default(),
+            force: 0.0,
+            along: None,
+            leader: (bodies.len(), 1.0),
+            is_rotor: false,
+        });
+        bodies.iter().enumerate().map(body).chain(yaw).collect()
+    }
+
+    /// The body that is the yaw of the bridge, if it yaws: behind those of the geometry.
+    pub fn yaw_body(&self) -> Option<usize> {
+        self.yaw.map(|_| self.geometry().bodies.len())
+    }
+
+    /// The spring of a bridge's bearings, if it yaws: behind the spans. Its length is ψ.
+    pub fn yaw_spring(&self) -> Option<usize> {
+        self.yaw.map(|_| self.geometry().spans.len())
+    }
+
+    fn bearings(&self) -> Option<Spring> {
+        let (yaw, body) = self.yaw.zip(self.yaw_body())?;
+        Some(Spring {
+            label: BEARINGS,
+            arms: vec![(body, 1.0)],
+            stiffness: yaw.stiffness(),
+            damping: yaw.damping(),
+            law: SpringLaw::TwoSided,
+            follows: None,
+        })
+    }
+
+    /// What the cart adds on a bridge that yaws.
+    fn ride(&self) -> Option<Ride> {
+        let (slides, yaw, bridge) = (self.geometry().slides, self.yaw_body()?, self.bridge.as_ref()?);
+        let gravity = GRAVITY * bridge.inclination.sin();
+        Some(Ride { bridge: slides.first()?.body, cart: self.geometry().cart(), yaw, gravity })
+    }
+
+    /// Lever arms of a span's elongation, or of its length from end to end, and that of the yaw.
+    fn with_yaw(&self, arms: impl Iterator<Item = (usize, f64)>, at: &SpanAt) -> Vec<(usize, f64)> {
+        let yaw = self.yaw.zip(self.yaw_body()).map(|(yaw, body)| (body, at.on_yaw * yaw.arm()));
+        arms.chain(yaw.filter(|(_, arm)| *arm != 0.0)).collect()
     }
 
     fn spans(&self) -> Vec<Spring> {
@@ -122,7 +174,7 @@ impl Machine {
             let there = self.span_alike(index) == Some(index);
             Spring {
                 label: at.label,
-                arms: at.arms.iter().map(|&(body, arm)| (body, arm.of(self.pulley_radius))).collect(),
+                arms: self.with_yaw(at.arms.iter().map(|&(body, arm)| (body, arm.of(self.pulley_radius))), at),
                 stiffness: if there { k[index] } else { 0.0 },
                 damping: if there { c[index] } else { 0.0 },
                 law: if there { law.clone() } else { SpringLaw::None },
@@ -150,7 +202,8 @@ impl Machine {
             BeltModel::TwoMass => make.spans[1] += make.spans[2],
             BeltModel::Rigid => return None,
         }
-        let follows = Follows { rigidity: make.rigidity(), length: make.spans[index], arms: at.follows.to_vec() };
+        let arms = self.with_yaw(at.follows.iter().copied(), at);
+        let follows = Follows { rigidity: make.rigidity(), length: make.spans[index], arms };
         (!at.follows.is_empty()).then_some(follows)
     }
 
@@ -176,7 +229,7 @@ impl Machine {
                 .chain([supply(drive), Shown::Position(geometry.cart(), 1.0)])
                 .collect(),
             _ => {
-                let stretches = geometry.telling_spans().map(Shown::Stretch);
+                let stretches = geometry.telling_spans().chain(self.yaw_spring()).map(Shown::Stretch);
                 loads.chain(currents).chain(forces).chain(stretches).chain(shafts).collect()
             }
         }
@@ -210,6 +263,11 @@ impl Machine {
             let [of_way, of_speed, _] = units(body);
             add(format!("{}_{way}", label.key), of_way, Shown::Position(body, 1.0), true);
             add(format!("{}_speed", label.key), of_speed, Shown::Speed(body, 1.0), true);
+        }
+        if let Some(yaw) = self.yaw_body() {
+            let [of_way, of_speed, _] = units(yaw);
+            add(format!("{}_angle", YAW.key), of_way, Shown::Position(yaw, 1.0), true);
+            add(format!("{}_speed", YAW.key), of_speed, Shown::Speed(yaw, 1.0), true);
         }
         for (drive, (at, _)) in drives() {
             add(at.current_column.into(), "A", Shown::Current(drive), true);
@@ -357,8 +415,11 @@ impl Machine {
         let gears = self.drives.iter().filter(|unit| unit.motor.gear_play.is_some()).count();
         let [bodies, springs] = [geometry.bodies.len() + gears, geometry.spans.len() + geometry.slides.len() + gears];
         let has_room = bodies + self.drives.len() <= BODIES_AND_DRIVES && bodies <= BODIES && springs <= SPRINGS;
-        match has_room || gears == 0 {
+        match (has_room && self.yaw.is_none()) || gears == 0 {
             true => Ok(()),
+            false if has_room => Err(Error::new("a gantry whose bridge yaws cannot have compliant gears yet")
+                .allowed("gears without gear_stiffness and backlash: there is no room for rotors beside its bodies")
+                .next("leave gear_stiffness, gear_damping and backlash out, or [bridge.yaw]")),
             false => Err(Error::new(format!("a {} gantry cannot have compliant gears yet", geometry.word))
                 .allowed("gears without gear_stiffness and backlash: there is no room for rotors beside its bodies")
                 .next("leave gear_stiffness, gear_damping and backlash out")),
@@ -386,6 +447,12 @@ impl Machine {
         positive("the bridge's mass", bridge.mass)?;
         positive("the cart's mass", self.cart.mass)?;
         self.belt.stiffness.iter().try_for_each(|&k| positive("the stiffness of a span", k))?;
+        if let Some(yaw) = self.yaw {
+            positive("the inertia of the bridge's yaw", yaw.inertia)?;
+            positive("the distance of the belts", yaw.belt_spacing)?;
+            positive("the distance of the bearings", yaw.bearing_spacing)?;
+            positive("the stiffness of a bearing", yaw.bearing_stiffness)?;
+        }
         for motor in self.drives.iter().map(|unit| &unit.motor) {
             positive("a resistance", motor.resistance)?;
             positive("a gear ratio", motor.gear_ratio)?;

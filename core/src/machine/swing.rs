@@ -7,7 +7,7 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// Eigenvalues up to this fraction of the largest count as zero.
 const NOTHING: f64 = 1e-9;
 
-/// Frequency of the slowest elastic mode on the spans of the belt, rad/s, at the origin and without damping; rotors
+/// Frequency of the slowest elastic mode on the spans of the belt and the bearings of the bridge, rad/s, at the origin and without damping; rotors
 /// turn with their pulleys. None for a machine whose belt does not stretch.
 ///
 /// M q̈ + K q = 0 with K = Σ k a aᵀ over the spans: the least eigenvalue of M^(−½) K M^(−½) above zero is ω₀².
@@ -28,7 +28,10 @@ pub fn slowest_swing(mechanism: &Mechanism) -> Option<f64> {
         }
     }
     let mut stiffness = DMatrix::zeros(n, n);
-    for &span in &mechanism.roles.spans {
+    // The bearings of a bridge that yaws hold it as a span does.
+    let yaws = |spring: &usize| mechanism.ride.is_some_and(|ride| mechanism.springs[*spring].arms == [(ride.yaw, 1.0)]);
+    let bearings: Vec<usize> = (0..mechanism.springs.len()).filter(yaws).collect();
+    for &span in mechanism.roles.spans.iter().chain(&bearings) {
         let arms = mechanism.leading_arms(span);
         let row = DVector::from_fn(n, |i, _| arms[bodies[i]]);
         stiffness += &row * row.transpose() * mechanism.springs[span].stiffness;

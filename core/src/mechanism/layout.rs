@@ -31,6 +31,8 @@ pub struct Replaced {
 #[derive(Debug, Clone)]
 pub struct Layout {
     bodies: usize,
+    /// The yaw of a bridge, whose angle counts from zero: springs depend on it by itself.
+    yaw: Option<usize>,
     /// Lengths that replace positions, each after those that it needs.
     pub replaced: Vec<Replaced>,
     /// Every spring's length from the coordinates: (spring, body of the coordinate, weight).
@@ -63,6 +65,7 @@ impl Layout {
         let place = |body: usize| 2 * body + if body < held { 0 } else { currents };
         let mut layout = Self {
             bodies,
+            yaw: mechanism.ride.map(|ride| ride.yaw),
             replaced: Vec::new(),
             terms: Vec::new(),
             coordinate: std::array::from_fn(place),
@@ -94,7 +97,10 @@ impl Layout {
                 }
                 left[body] = 0.0;
             }
-            let turns = |&b: &usize| left[b] != 0.0 && matches!(mechanism.bodies[b].kind, Kind::Rotary { .. });
+            // The yaw of a bridge is a coordinate by itself.
+            let turns = |&b: &usize| {
+                left[b] != 0.0 && matches!(mechanism.bodies[b].kind, Kind::Rotary { .. }) && layout.yaw != Some(b)
+            };
             match (0..bodies).find(turns) {
                 // The row becomes a coordinate and replaces a pulley that hangs on it.
                 Some(body) if spring.arms.len() > 1 => {
@@ -178,7 +184,8 @@ impl Layout {
 
     /// Origin of the positions in a run that begins in `start`.
     pub fn origin(&self, start: &State) -> [f64; BODIES] {
-        std::array::from_fn(|b| if b < self.bodies && !self.is_replaced(b) { start.position[b] } else { 0.0 })
+        let counts = |b: usize| b < self.bodies && !self.is_replaced(b) && self.yaw != Some(b);
+        std::array::from_fn(|b| if counts(b) { start.position[b] } else { 0.0 })
     }
 
     /// Difference between a spring's length and that from its coordinates, for positions counted from `origin`.

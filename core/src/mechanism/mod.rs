@@ -18,6 +18,7 @@ mod mode;
 mod nudge;
 mod phases;
 mod power;
+mod ride;
 mod transition;
 
 pub use drive::{Amplifier, AmplifierMode, GearPlay, Motor, Stepper};
@@ -28,6 +29,7 @@ pub use layout::{Layout, Replaced};
 pub use mode::{Cause, Contact, DriveMode, Guard, Limit, Mode, Part, Status, Switch, What};
 pub use phases::{PhaseRate, Phases, Steady};
 pub use power::Power;
+pub use ride::{Ridden, Ride, RideLaw, Riding};
 pub use transition::{After, Next, Place, Resets, Then, Transition};
 
 use crate::friction::Friction;
@@ -38,10 +40,10 @@ use std::sync::Arc;
 /// Maximum number of bodies.
 pub const BODIES: usize = 6;
 /// Maximum number of springs.
-pub(crate) const SPRINGS: usize = 8;
+pub(crate) const SPRINGS: usize = 9;
 /// Maximum number of drives.
 pub const DRIVES: usize = 3;
-/// Maximum of both together: three drives allow one body less than two drives.
+/// Maximum of both together for the exact solver: three drives allow one body less than two drives.
 pub(crate) const BODIES_AND_DRIVES: usize = BODIES + 2;
 /// Maximum number of currents that are states: one for each brushed motor, two for each of two steppers.
 pub const CURRENTS: usize = 4;
@@ -340,6 +342,8 @@ pub struct Mechanism {
     pub readings: Vec<Shown>,
     /// The roles of its parts.
     pub roles: Roles,
+    /// A cart that rides on a bridge that yaws, if there is one.
+    pub ride: Option<Ride>,
     /// Coordinates of the origin, for parts that depend on them.
     pub origin: [f64; BODIES],
     /// Linear part of the friction of each body and its followers, and whether it sticks.
@@ -350,7 +354,6 @@ impl Mechanism {
     /// The mechanism of these parts. Rotors come last, and no list exceeds its maximum.
     pub fn new(bodies: Vec<Body>, springs: Vec<Spring>, drives: Vec<Drive>) -> Self {
         assert!(bodies.len() <= BODIES && springs.len() <= SPRINGS && drives.len() <= DRIVES);
-        assert!(bodies.len() + drives.len() <= BODIES_AND_DRIVES);
         assert!(bodies.iter().is_sorted_by_key(|body| body.is_rotor));
         assert!(drives.iter().map(Drive::windings).sum::<usize>() <= CURRENTS);
         let mut friction = vec![(Friction::default(), Friction::default()); bodies.len()];
@@ -369,7 +372,7 @@ impl Mechanism {
         }
         let friction = friction.into_iter().map(|(all, sticking)| (all, !sticking.is_linear())).collect();
         let (columns, readings, roles) = (Vec::new(), Vec::new(), Roles::default());
-        Self { bodies, springs, drives, columns, readings, roles, origin: [0.0; BODIES], friction }
+        Self { bodies, springs, drives, columns, readings, roles, ride: None, origin: [0.0; BODIES], friction }
     }
 
     /// Initial state of a run for a given one: rotors in the middle of their play, and zero for currents that are not
@@ -446,6 +449,7 @@ impl Mechanism {
         self.bodies.iter().all(straight)
             && self.springs.iter().all(|spring| spring.follows.is_none())
             && self.drives.iter().all(|drive| drive.motor.stepper.is_none())
+            && self.ride.is_none()
     }
 
     /// Length of a spring.

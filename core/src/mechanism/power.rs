@@ -76,7 +76,7 @@ impl Mechanism {
             .filter_map(|(number, current)| Some((self.drive_of_current(number)?, current)))
             .map(|(drive, current)| self.drives[drive].motor.inductance * current.powi(2))
             .sum();
-        0.5 * (kinetic + elastic + magnetic)
+        0.5 * (kinetic + elastic + magnetic) + self.riding_energy(state)
     }
 
     /// Elongation of a spring, counted from the onset of its force.
@@ -99,7 +99,7 @@ impl Mechanism {
         Strain { way, strain, rate }
     }
 
-    /// The power balance at `state` under `input` in `mode`, of a machine with brushed motors.
+    /// The power balance at `state` under `input` in `mode`, of a machine with brushed motors whose bridge does not yaw.
     pub fn power(&self, mode: Mode, state: &State, input: &[f64; DRIVES]) -> Power {
         let equations = self.equations(mode);
         let acceleration = equations.acceleration.map(|form| form.value(self, state, input));

@@ -2,7 +2,7 @@
 
 use super::rotor::Rotor;
 use super::steady::{Held, Plateau};
-use super::{EventCount, LostSteps, Metrics, OfDrive, OfLoad, OfSpan, Peak, Seek};
+use super::{EventCount, LostSteps, Metrics, OfDrive, OfLoad, OfSpan, OfYaw, Peak, Seek};
 use crate::friction::Motion;
 use crate::machine::{Machine, Stepper};
 use crate::mechanism::{Mechanism, Mode, Shown, State, Status, What};
@@ -37,6 +37,7 @@ struct Places {
     belt_speeds: Vec<Place>,
     shaft_speeds: Vec<Place>,
     currents: Vec<Place>,
+    /// Of the spans, then the yaw of a bridge that yaws.
     stretches: Vec<Place>,
     forces: Vec<Place>,
     sums: Vec<Sum>,
@@ -53,20 +54,24 @@ impl Places {
         let place = |wanted: Shown| find(wanted).map_or(Place::Sum(usize::MAX), |q| Place::Reading(q, 1.0));
         let mut sums: Vec<Sum> = Vec::new();
         // An elongation without a reading is a sum of those with one.
-        let mut summed = |terms: &[(usize, f64)]| match terms {
-            &[(span, 1.0)] if find(Shown::Stretch(span)).is_some() => place(Shown::Stretch(span)),
+        let yaw = machine.yaw_spring().and_then(|spring| find(Shown::Stretch(spring))).zip(machine.yaw);
+        // `on_yaw` is what the sum is by itself per a ψ.
+        let mut summed = |terms: &[(usize, f64)], on_yaw: f64| match terms {
+            &[(span, 1.0)] if yaw.is_none() && find(Shown::Stretch(span)).is_some() => place(Shown::Stretch(span)),
             _ => {
                 let term = |&(span, weight): &(usize, f64)| Some((find(Shown::Stretch(span))?, weight));
-                sums.push(terms.iter().filter_map(term).collect());
+                let of_yaw = yaw.map(|(reading, yaw)| (reading, yaw.arm() * geometry.left_to_yaw(on_yaw, terms)));
+                sums.push(terms.iter().filter_map(term).chain(of_yaw.filter(|(_, weight)| *weight != 0.0)).collect());
                 Place::Sum(sums.len() - 1)
             }
         };
-        let load_errors = geometry.slides.iter().map(|slide| summed(slide.error)).collect();
+        let load_errors = geometry.slides.iter().map(|slide| summed(slide.error, 0.0)).collect();
         let stretches = (0..geometry.spans.len()).map(|span| match place(Shown::Stretch(span)) {
             read @ Place::Reading(..) => read,
-            Place::Sum(_) => summed(geometry.spans[span].by_others),
+            Place::Sum(_) => summed(geometry.spans[span].by_others, geometry.spans[span].on_yaw),
         });
-        let stretches = stretches.collect();
+        let mut stretches: Vec<Place> = stretches.collect();
+        stretches.extend(yaw.map(|(reading, _)| Place::Reading(reading, 1.0)));
         let belt_speeds: Vec<Place> = match &mechanism.drives[..] {
             [drive] => vec![place(Shown::Speed(drive.pulley, machine.pulley_radius))],
             _ => Vec::new(),
@@ -79,7 +84,7 @@ impl Places {
             _ => place(Shown::Speed(drive.shaft, 1.0)),
         });
         let shaft_speeds = shafts.collect();
-        let bodies = geometry.bodies.len();
+        let (bodies, rotors) = (geometry.bodies.len(), mechanism.held_bodies().end..mechanism.bodies.len());
         let rotor = |body: usize| Some((body, find(Shown::Speed(body, 1.0))?));
         Self {
             bodies,
@@ -93,7 +98,7 @@ impl Places {
                 .map(|span| place(Shown::Force(machine.span_alike(span).unwrap_or(span), 1.0)))
                 .collect(),
             sums,
-            rotors: (bodies..mechanism.bodies.len()).filter_map(rotor).collect(),
+            rotors: rotors.filter_map(rotor).collect(),
             shafts: mechanism.drives.iter().map(|drive| drive.shaft).collect(),
         }
     }
@@ -326,6 +331,10 @@ impl Meter {
             loads: geometry.slides.iter().zip(machine.by_drives(&state.position)).enumerate().map(load).collect(),
             drives: geometry.drives.iter().enumerate().map(drive).collect(),
             spans: (0..geometry.spans.len()).map(span).collect(),
+            yaw: machine.yaw_body().map(|body| OfYaw {
+                angle: state.position[body],
+                peak: peak(places.stretches.get(geometry.spans.len())),
+            }),
             bodies: counts,
             steady_speed: self.plateau.as_ref().and_then(|plateau| plateau.steady_speed(machine)),
             stop_time: last.map(|time| time.max(turned)).filter(|_| settled),

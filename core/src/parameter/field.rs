@@ -34,6 +34,8 @@ pub(super) enum Of {
     Machine,
     /// A machine with one drive and one slide: others have one row for each slide, or lack the part.
     Axis,
+    /// A machine with several slides.
+    Gantry,
     /// Each drive.
     Drive,
     /// Each slide of a machine with several.
@@ -51,6 +53,7 @@ impl Accessor {
         match self.of {
             Of::Machine => Some((List::None, 1)),
             Of::Axis => (slides == 1).then_some((List::None, 1)),
+            Of::Gantry => (slides > 1).then_some((List::None, 1)),
             Of::Drive if drives == 1 => Some((List::None, 1)),
             Of::Drive => Some((List::Drives(machine.kind), drives)),
             Of::Slide => (slides > 1).then_some((List::Slides, slides)),

@@ -76,8 +76,9 @@ impl Machine {
         let of_drive = self.geometry().drives.iter().find_map(|drive| key.strip_prefix(drive.key));
         let row = named(of_cart.as_deref().or(of_drive).unwrap_or(key))?;
         let list = self.sits(row).listed().map(|(list, _)| list);
-        // A drive contains only keys of its own parts.
-        (of_drive.is_none() || matches!(list, Some(List::Drives(_)))).then_some(row)
+        // A drive contains only keys of its own parts, a cart only those of every slide.
+        let belongs = of_drive.is_none() || matches!(list, Some(List::Drives(_)));
+        (belongs && (of_cart.is_none() || list == Some(List::Slides))).then_some(row)
     }
 
     /// The friction of each of its bodies.

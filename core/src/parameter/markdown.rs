@@ -43,6 +43,7 @@ pub fn free_markdown() -> String {
             Of::Machine | Of::Drive => ("both", List::None),
             Of::Span => ("both", List::Numbers),
             Of::Axis => ("axis", List::None),
+            Of::Gantry => ("gantry", List::None),
             Of::Point(_) => ("axis", List::Points),
             Of::Slide => ("gantry", List::Slides),
         };

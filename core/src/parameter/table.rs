@@ -629,6 +629,20 @@ const BRIDGE: &[Parameter] = &[
 ];
 
 #[rustfmt::skip]
+const BRIDGE_YAW: &[Parameter] = &[
+    row("bridge.yaw.inertia", "I", "kg m^2", Required, POSITIVE, "0.02 kg m^2", "Moment of inertia of the bridge without the cart, about a vertical axis through its middle.")
+        .at(part!(Gantry, |s| s.yaw, &mut s.yaw => inertia)),
+    row("bridge.yaw.belt_spacing", "2 a", "m", Required, POSITIVE, "0.5 m", "Distance of the belts on either side of the bridge.")
+        .at(part!(Gantry, |s| s.yaw, &mut s.yaw => belt_spacing)),
+    row("bridge.yaw.bearing_spacing", "s", "m", Required, POSITIVE, "60 mm", "Distance of the bridge's two bearings along its travel.")
+        .at(part!(Gantry, |s| s.yaw, &mut s.yaw => bearing_spacing)),
+    row("bridge.yaw.bearing_stiffness", "k_b", "N/m", Required, POSITIVE, "20 kN/mm", "Stiffness of each bearing across the travel; of four bearings on two rails twice as much.")
+        .at(part!(Gantry, |s| s.yaw, &mut s.yaw => bearing_stiffness)).off("bearing"),
+    row("bridge.yaw.bearing_damping", "c_b", "N s/m", Value(0.0), NOT_NEGATIVE, "100 N s/m", "Damping of each bearing.")
+        .at(part!(Gantry, |s| s.yaw, &mut s.yaw => bearing_damping)),
+];
+
+#[rustfmt::skip]
 const GANTRY_INITIAL: &[Parameter] = &[
     row("gantry.initial.bridge_position", "x", "m", Value(0.0), ANY, "0 mm", "Position of the bridge at time zero."),
     row("gantry.initial.bridge_speed", "x′", "m/s", Value(0.0), ANY, "0 m/s", "Its speed."),
@@ -886,6 +900,7 @@ pub(super) const SECTIONS: &[(&str, &[&[Parameter]])] = &[
             )),
         ],
     ),
+    ("bridge.yaw", &[BRIDGE_YAW]),
     ("belt", &[BELT]),
     ("travel", &[TRAVEL]),
     ("encoder", &[ENCODER]),

@@ -1,4 +1,5 @@
-//! Natural frequencies of a machine along its travel, from its masses and springs.
+//! Natural frequencies of a machine along its travel, from its masses and springs; a bridge that yaws has the mass matrix
+//! of the cart's position.
 
 use crate::error::{Error, Result};
 use crate::machine::{AmplifierMode, BeltModel, DriveAt, DriveUnit, Machine, Travel};
@@ -87,7 +88,7 @@ impl Reach {
 }
 
 /// Modes of a machine that move one of its coordinates: the cart of an axis, bridge or cart of a gantry; at every
-/// position along the travel if the spans follow the slides, otherwise at one.
+/// position along the travel if the spans follow the slides or the bridge yaws, otherwise at one.
 ///
 /// For the sliding machine, M q̈ + C q̇ + K q = 0 with viscous friction, belt damping and, for a free motor in voltage
 /// mode, back-EMF. Frequencies follow from K and M alone; damping ratios ζ = φᵀ C φ / (2 ω φᵀ M φ) hold for light
@@ -118,7 +119,8 @@ pub fn resonances(machine: &Machine, drive: Drive, coordinate: usize) -> Result<
 fn places(machine: &Machine, coordinate: usize) -> Vec<Vec<f64>> {
     let travels: Vec<Option<Travel>> = machine.travels().map(|(_, travel)| travel).collect();
     let along = |travel: &Option<Travel>, count: usize| -> Vec<f64> {
-        let Some(travel) = travel.filter(|_| machine.belt.follows_cart) else { return vec![0.0] };
+        let changes = machine.belt.follows_cart || machine.yaw.is_some();
+        let Some(travel) = travel.filter(|_| changes) else { return vec![0.0] };
         let part = |k: usize| k as f64 / (count - 1) as f64;
         (0..count).map(|k| travel.min + part(k) * (travel.max - travel.min)).collect()
     };
@@ -157,8 +159,13 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
     let size = m.nrows() - first;
     let part = |a: &DMatrix<f64>| a.view((first, first), (size, size)).into_owned();
     let root = m.diagonal().rows(first, size).map(|mass| mass.sqrt().recip());
-    // M^(−½) K M^(−½) u = ω² u, φ = M^(−½) u
-    let scaled = DMatrix::from_fn(size, size, |i, j| part(&k)[(i, j)] * root[i] * root[j]);
+    // L⁻¹ with M = L Lᵀ, of a bridge that yaws
+    let lower = machine.yaw.and_then(|_| part(&m).cholesky()?.l().try_inverse());
+    let scaled = match &lower {
+        Some(lower) => lower * part(&k) * lower.transpose(),
+        // M^(−½) K M^(−½) u = ω² u, φ = M^(−½) u
+        None => DMatrix::from_fn(size, size, |i, j| part(&k)[(i, j)] * root[i] * root[j]),
+    };
     let eigen = SymmetricEigen::new(scaled);
     let slide = &geometry.slides[coordinate];
     let force = match (drive, fields) {
@@ -191,7 +198,10 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
             return None;
         }
         let omega = squared.sqrt();
-        let shape = eigen.eigenvectors.column(i).component_mul(&root);
+        let shape = match &lower {
+            Some(lower) => lower.tr_mul(&eigen.eigenvectors.column(i)),
+            None => eigen.eigenvectors.column(i).component_mul(&root),
+        };
         let damping = (shape.transpose() * part(&c) * &shape)[(0, 0)] / (2.0 * omega);
         let share = (shape[load] * shape.dot(&force) / squared).abs();
         let (position, frequency) = (slides[coordinate], omega / (2.0 * PI));
@@ -210,14 +220,17 @@ fn field(unit: &DriveUnit) -> Option<f64> {
 /// M, C and K over the bodies other than rotors; over φ₁ and x for a two-mass axis.
 fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
     let (geometry, mechanism) = (machine.geometry(), machine.mechanism());
-    let count = geometry.bodies.len();
+    let count = mechanism.held_bodies().end;
     let mut stiffness: Vec<f64> = machine.belt.stiffness.into_iter().collect();
-    let damping: Vec<f64> = machine.belt.damping.into_iter().collect();
+    let mut damping: Vec<f64> = machine.belt.damping.into_iter().collect();
     if let (Some(lengths), Some(make)) = (machine.span_lengths(slides), &machine.belt.make) {
         for ((k, length), span) in stiffness.iter_mut().zip(lengths).zip(geometry.spans) {
             *k = if span.follows.is_empty() { *k } else { make.rigidity() / length };
         }
     }
+    // The bearings of a bridge that yaws stand behind the spans.
+    stiffness.extend(machine.yaw.map(|yaw| yaw.stiffness()));
+    damping.extend(machine.yaw.map(|yaw| yaw.damping()));
     let arm = |span: usize, body: usize| mechanism.stretch_rate(span).speed[body];
     // Σ k dᵀ d over the spans' stretches d
     let sum = |values: &[f64]| {
@@ -256,5 +269,9 @@ fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, D
     // A pulley without inertia follows at once; a tiny inertia keeps the mass matrix regular.
     let tiny = 1e-9 * machine.cart.mass * machine.pulley_radius * machine.pulley_radius;
     masses.iter_mut().for_each(|mass| *mass = mass.max(tiny));
-    (diagonal(&masses), sum(&damping) + diagonal(&resisting), sum(&stiffness) + diagonal(&held))
+    let mut mass = diagonal(&masses);
+    let bodies: Vec<usize> = (0..count).collect();
+    let position = machine.without_strain(slides, &[]).position;
+    mechanism.ridden_mass(&bodies, &position).into_iter().for_each(|(i, j, own)| mass[(i, j)] += own);
+    (mass, sum(&damping) + diagonal(&resisting), sum(&stiffness) + diagonal(&held))
 }

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::friction::Law;
 use crate::machine::axis::CART;
 use crate::machine::{BeltModel, Kind, Machine};
-use crate::mechanism::{AmplifierMode, Mechanism, SpringLaw, State};
+use crate::mechanism::{AmplifierMode, BODIES_AND_DRIVES, Mechanism, SpringLaw, State};
 use crate::parameter;
 use crate::plan::Experiment;
 use crate::polyline::MOST_POINTS;
@@ -143,7 +143,10 @@ pub(super) fn piecewise_linear(mechanism: &Mechanism) -> Result<()> {
         "the belt's spans follow the cart".into()
     } else if mechanism.drives.iter().any(|drive| drive.motor.stepper.is_some()) {
         "the torque of a stepper depends on the sine of its angle".into()
+    } else if mechanism.ride.is_some() {
+        "the bridge yaws, and its inertia depends on where the cart is".into()
     } else {
+        assert!(mechanism.bodies.len() + mechanism.drives.len() <= BODIES_AND_DRIVES);
         return Ok(());
     };
     Err(Error::new(format!("{what}: this solver does not support it"))

@@ -17,7 +17,8 @@ pub(crate) struct Coordinates {
     start: State,
     /// Coordinates of the origin.
     origin: [f64; BODIES],
-    /// Elongations at the start, by the bodies whose positions they replace.
+    /// Elongations at the start, by the bodies whose positions they replace; without those by coordinates that do not
+    /// begin at zero.
     strain: [f64; BODIES],
     /// Angles of pulleys while they are stuck, rad: they keep every bit while the rest moves.
     held: [Option<f64>; BODIES],
@@ -41,8 +42,10 @@ impl Coordinates {
                 size = size.max((arm * start.position[other]).abs());
             }
             let length = replaced.own.mul_add(own, others);
-            strain[replaced.body] = if length.abs() <= LAST_PLACES * f64::EPSILON * size { 0.0 } else { length };
-            inner.position[replaced.body] = strain[replaced.body];
+            let length = if length.abs() <= LAST_PLACES * f64::EPSILON * size { 0.0 } else { length };
+            let others = replaced.others.iter().filter(|_| !replaced.on_replaced);
+            let begun: f64 = others.map(|&(other, arm)| arm * (start.position[other] - origin[other])).sum();
+            (inner.position[replaced.body], strain[replaced.body]) = (length, length - begun);
         }
         (Self { start: *start, origin, strain, held: [None; BODIES] }, inner)
     }

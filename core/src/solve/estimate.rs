@@ -307,6 +307,7 @@ mod tests {
             drive_pulley: Pulley { inertia: 1.0467e-5, friction: drive.following(bristles) },
             idler_pulley: Pulley { inertia: 2.2482e-5, friction: idler.following(exponential) },
             bridge: None,
+            yaw: None,
             cart: slide,
             belt,
             encoder: None,

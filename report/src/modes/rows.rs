@@ -152,6 +152,10 @@ pub fn where_it_matters(analysis: &Analysis) -> &'static str {
         true if belt.following().is_some() => {
             "the spans follow bridge and cart: k = A E / l with the length that is left"
         }
+        true if analysis.case.machine.yaw.is_some() => {
+            "the bridge yaws, and its inertia changes with the cart's position: --bridge and --at name a place, and with \
+             the travel of both there is a map"
+        }
         false if belt.make.is_some() => {
             "the same along the travel: this file's stiffness does not depend on the position \
              (belt.follows_cart = true makes spans 1 and 2 follow the cart)"

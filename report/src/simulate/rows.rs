@@ -144,6 +144,13 @@ pub fn lines(run: &Run, machine: &Machine, solver: Solver) -> Vec<(&'static str,
         lines.push(("peak stretch", at(stretch, "m", format!("{} in {name}", value(stretch.value, "m")))));
         lines.push(("peak force", forces(metrics, geometry)));
     }
+    if let Some(yaw) = metrics.yaw {
+        let end = value(yaw.angle, "rad");
+        lines.push((
+            "yaw",
+            format!("{}, {end} at the end", at(yaw.peak, "rad", format!("at most {}", value(yaw.peak.value, "rad")))),
+        ));
+    }
     lines.push(("peak current", currents(metrics, geometry)));
     lines.extend(lost_steps(metrics, geometry).map(|words| ("lost steps", words)));
     lines.push(("stop time", stop(metrics, &labels, solver)));

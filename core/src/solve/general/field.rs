@@ -2,9 +2,11 @@
 
 use super::linear::{Linear, Output, STATES, States};
 use super::model::{MOST_GUARDS, Model, Vector};
-use super::sources::{Phasing, SOURCES, Source};
+use super::sources::{Argument, Phasing, SOURCES, Source};
 use crate::friction::{Law, Motion};
-use crate::mechanism::{BODIES, Cause, DRIVES, Equations, Form, Mode, ROUNDING, Switch, Transition};
+use crate::mechanism::{
+    BODIES, Cause, DRIVES, Equations, Form, Mode, ROUNDING, Ridden, Ride, Riding, Switch, Transition,
+};
 use std::sync::Arc;
 
 /// A guard as a row.
@@ -157,6 +159,7 @@ impl Field {
             self.linear.source.push(column);
         }
         self.add_phases();
+        let rates = self.add_ride();
         // Speeds that forces change are what errors are measured by.
         if !self.sources.is_empty() {
             let moved = |place: &usize| self.linear.source.iter().any(|column| column[*place] != 0.0);
@@ -168,7 +171,50 @@ impl Field {
         // One of an input alone is known.
         let first = |row: &States| row.iter().copied().enumerate().find(|(_, weight)| *weight != 0.0);
         self.measured = rows.map(|row| first(row).unwrap_or((0, 1.0))).collect();
+        // An error of an acceleration counts by the speed that it changes.
+        rates.into_iter().for_each(|argument| self.measured[argument].1 = f64::INFINITY);
         self.linear.arguments = self.linear.outputs.len();
+    }
+
+    /// What a cart on a bridge that yaws adds; the arguments that are accelerations.
+    fn add_ride(&mut self) -> Vec<usize> {
+        let model = Arc::clone(&self.model);
+        let Some(ride) = model.mechanism.ride else { return Vec::new() };
+        let Ride { bridge, cart, yaw, .. } = ride;
+        let moves = |body: usize| self.mode.motion[body] != Motion::Stuck;
+        let law = ride.law(&model.mechanism, moves(bridge), moves(cart));
+        let place = |body: usize| (model.coordinate(body), model.mechanism.origin[body]);
+        let ((cart_place, cart_origin), (yaw_place, yaw_origin)) = (place(cart), place(yaw));
+        let of = |number: usize, origin: f64| Argument { number, origin };
+        let free = [bridge, cart, yaw].map(|body| self.acceleration(body));
+        let arguments = Riding {
+            cart: of(self.argument_at(cart_place), cart_origin),
+            cart_speed: of(self.argument_at(model.speed(cart)), 0.0),
+            yaw: of(self.argument_at(yaw_place), yaw_origin),
+            yaw_speed: of(self.argument_at(model.speed(yaw)), 0.0),
+            bridge_free: of(free[0], 0.0),
+            cart_free: of(free[1], 0.0),
+            yaw_free: of(free[2], 0.0),
+        };
+        for on in Ridden::ALL {
+            self.sources.push(Source::Ride { on, law, arguments });
+            let body = ride.body(on);
+            let column = self.column(|leader| if leader == body { -1.0 } else { 0.0 });
+            self.linear.source.push(column);
+        }
+        free.to_vec()
+    }
+
+    /// The acceleration of a body without a ride as an argument: by the state, the inputs, and the forces so far.
+    fn acceleration(&mut self, body: usize) -> usize {
+        let place = self.model.speed(body);
+        let moves = self.mode.motion[body] != Motion::Stuck;
+        let form = if moves { self.equations.acceleration[body] } else { Form::ZERO };
+        let mut row = [0.0; STATES];
+        row.iter_mut().zip(self.model.row(&form)).for_each(|(own, value)| *own = value);
+        let source = self.linear.source.iter().map(|column| column[place]).collect();
+        self.linear.outputs.push(Output { row, input: form.input, constant: form.constant, source });
+        self.linear.outputs.len() - 1
     }
 
     /// The torque and the two voltages of each stepper.
@@ -206,7 +252,10 @@ impl Field {
             let plain = output.source.iter().all(|weight| *weight == 0.0)
                 && output.constant == 0.0
                 && output.input == [0.0; DRIVES];
-            let known = self.linear.outputs[..arguments].iter().position(|argument| argument.row == output.row);
+            let is_this = |argument: &Output| {
+                argument.row == output.row && argument.constant == 0.0 && argument.source.iter().all(|by| *by == 0.0)
+            };
+            let known = self.linear.outputs[..arguments].iter().position(is_this);
             self.output.push(known.filter(|_| plain).unwrap_or(self.linear.outputs.len()));
             if known.filter(|_| plain).is_none() {
                 self.linear.outputs.push(output);
@@ -243,6 +292,10 @@ impl Field {
                     if phased.leader == body { load * phased.ratio } else { 0.0 }
                 }
                 Source::Phase(..) => 0.0,
+                Source::Ride { on, .. } => match mechanism.ride {
+                    Some(ride) if ride.body(*on) == body => -load,
+                    _ => 0.0,
+                },
             };
             self.sources.iter().map(of).collect()
         };
@@ -270,7 +323,11 @@ impl Field {
                             -1.0
                         }
                     }
-                    Source::Spring { .. } | Source::Friction { .. } | Source::Torque(_) | Source::Phase(..) => 0.0,
+                    Source::Spring { .. }
+                    | Source::Friction { .. }
+                    | Source::Torque(_)
+                    | Source::Phase(..)
+                    | Source::Ride { .. } => 0.0,
                 };
                 self.sources.iter().map(own).collect()
             }
@@ -281,8 +338,11 @@ impl Field {
 
     /// The forces at one instant.
     pub(super) fn forces(&self, input: &[f64; DRIVES], y: &Vector, forces: &mut [f64]) {
-        for (force, source) in forces.iter_mut().zip(&self.sources) {
-            *force = source.at_begin(&self.model, &self.mode, input, y);
+        for (number, source) in self.sources.iter().enumerate() {
+            // Each depends on those before it at most.
+            let value = |argument: usize| self.linear.outputs[argument].value(y, input, forces);
+            let force = source.at_begin(&self.model, &self.mode, (input, y), value);
+            forces[number] = force;
         }
     }
 

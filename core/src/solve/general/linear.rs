@@ -37,6 +37,14 @@ pub(super) struct Output {
 }
 
 impl Output {
+    /// Its value.
+    pub(super) fn value(&self, y: &[f64], input: &[f64; DRIVES], forces: &[f64]) -> f64 {
+        fn add(sum: f64, weights: &[f64], values: &[f64]) -> f64 {
+            weights.iter().zip(values).fold(sum, |sum, (weight, value)| sum + weight * value)
+        }
+        add(add(add(self.constant, &self.row, y), &self.input, input), &self.source, forces)
+    }
+
     /// Adds what the constant and the inputs add to it at once to the columns of what is known.
     fn put_at_once(&self, size: usize, degree: usize, base: &mut [Lane]) {
         base[size].iter_mut().for_each(|lane| *lane += self.constant);
@@ -377,7 +385,11 @@ impl Set {
             lead(linear, rows, moments, (h, degree), base);
             output.put_at_once(linear.size, degree, base);
             let reach = linear.norm * h;
+            let begin = weights.len();
             weights.extend(moments[1 + linear.inputs..].iter().map(|m| driven(m, h, reach, radau::order(reach))));
+            for (lanes, at_once) in weights[begin..].iter_mut().zip(&output.source).filter(|(_, by)| **by != 0.0) {
+                lanes[1..POINTS].iter_mut().enumerate().for_each(|(node, lane)| lane[node] += at_once);
+            }
         }
         Self { h, degree, weights, base, full: OnceLock::new() }
     }

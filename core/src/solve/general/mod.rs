@@ -1,10 +1,10 @@
-//! The general solver: any friction law, and spans that follow the cart.
+//! The general solver: any friction law, spans that follow the cart, steppers, and a bridge that yaws.
 //!
-//! The modes, their linear equations and their guards are those of the exact solver. Nonlinear forces of friction laws
-//! and belts are approximated within a step by quartics of time, which collocation finds ([`step`]). With these the
-//! equations are linear, and solved as by the exact solver ([`linear`]): a step is a product of matrices, or a Taylor
-//! series along which guards are searched for their first fall, so that two crossings within a step are detected. A
-//! step with an event is repeated up to the event.
+//! The modes, their linear equations and their guards are those of the exact solver. Nonlinear forces of friction laws,
+//! belts, and the part of a mass matrix that is not diagonal are approximated within a step by quartics of time, which
+//! collocation finds ([`step`]). With these the equations are linear, and solved as by the exact solver ([`linear`]): a
+//! step is a product of matrices, or a Taylor series along which guards are searched for their first fall, so that two
+//! crossings within a step are detected. A step with an event is repeated up to the event.
 
 mod bristles;
 mod change;

@@ -1,7 +1,9 @@
 //! A machine made ready for the general solver: what its laws and its belt add to the linear equations of a mode.
 
 use crate::friction::{Friction, Law, Motion};
-use crate::mechanism::{BODIES, CURRENTS, DRIVES, Follows, Form, Layout, Mechanism, Mode, Phases, SPRINGS, State};
+use crate::mechanism::{
+    BODIES, CURRENTS, DRIVES, Follows, Form, Layout, Mechanism, Mode, Phases, ROUNDING, Ridden, Riding, SPRINGS, State,
+};
 use crate::solve::record::Extra;
 use std::sync::Arc;
 
@@ -348,12 +350,52 @@ impl Model {
     pub(super) fn load(&self, body: usize, forward: bool, mode: &Mode, y: &[f64], input: &[f64; DRIVES]) -> f64 {
         let inner = self.inner(y);
         let resting = self.mechanism.resting_mode(mode, |form| self.value(form, &inner, input));
-        self.value(&self.mechanism.load(body, forward, &resting), &inner, input) + self.loads(mode, y)[body]
+        let own = self.value(&self.mechanism.load(body, forward, &resting), &inner, input) + self.loads(mode, y)[body];
+        own - self.ridden_at_rest(body, mode, y)
+    }
+
+    /// What a ride takes from the load on a body that rests.
+    fn ridden_at_rest(&self, body: usize, mode: &Mode, y: &[f64]) -> f64 {
+        let mut resting = *mode;
+        self.mechanism.followers(body).for_each(|body| resting.motion[body] = Motion::Stuck);
+        self.ridden(&resting, y)[body]
+    }
+
+    /// What a ride takes from the forces on its bodies in this mode, N or N m.
+    fn ridden(&self, mode: &Mode, y: &[f64]) -> [f64; BODIES] {
+        let mut ridden = [0.0; BODIES];
+        let mechanism = &*self.mechanism;
+        let Some(ride) = mechanism.ride else { return ridden };
+        let (equations, inner) = (mechanism.equations(*mode), self.inner(y));
+        let (loads, friction) = (self.loads(mode, y), self.friction_of_laws(mode, y));
+        let moves = |body: usize| mode.motion[body] != Motion::Stuck;
+        // No input is on these bodies.
+        let free = |body: usize| match moves(body) {
+            true => {
+                let beyond = (loads[body] - friction[body]) / mechanism.mass(body, &equations.inertia);
+                self.value(&equations.acceleration[body], &inner, &[0.0; DRIVES]) + beyond
+            }
+            false => 0.0,
+        };
+        let place = |body: usize| mechanism.origin[body] + inner.position[body];
+        let at = Riding {
+            cart: place(ride.cart),
+            cart_speed: inner.speed[ride.cart],
+            yaw: place(ride.yaw),
+            yaw_speed: inner.speed[ride.yaw],
+            bridge_free: free(ride.bridge),
+            cart_free: free(ride.cart),
+            yaw_free: free(ride.yaw),
+        };
+        let law = ride.law(mechanism, moves(ride.bridge), moves(ride.cart));
+        Ridden::ALL.into_iter().for_each(|on| ridden[ride.body(on)] = law.force(on, &at));
+        ridden
     }
 
     /// Its rounding error.
     pub(super) fn noise(&self, body: usize, mode: &Mode, y: &[f64], input: &[f64; DRIVES]) -> f64 {
-        self.mechanism.load(body, true, mode).noise(&self.layout, &self.inner(y), input)
+        let own = self.mechanism.load(body, true, mode).noise(&self.layout, &self.inner(y), input);
+        own + ROUNDING * self.ridden_at_rest(body, mode, y).abs()
     }
 
     /// Breakaway in this direction of a body at rest and all bodies joined to it, at its position: Σ ρ a(x) F_b.
@@ -377,11 +419,21 @@ impl Model {
     }
 
     /// Friction beyond b v ± F_c on each body that moves by itself, of all that moves with it.
-    fn friction(&self, mode: &Mode, y: &[f64]) -> [f64; BODIES] {
+    fn friction_of_laws(&self, mode: &Mode, y: &[f64]) -> [f64; BODIES] {
         let mut friction = [0.0; BODIES];
         for curved in &self.curved {
             // Power is conserved: F = ρ τ
             friction[curved.leader] += curved.ratio * self.beyond_straight(curved, mode.motion[curved.body], y);
+        }
+        friction
+    }
+
+    /// The same, and what friction holds of forces that are not in the linear equations while a body rests.
+    fn friction(&self, mode: &Mode, y: &[f64]) -> [f64; BODIES] {
+        let mut friction = self.friction_of_laws(mode, y);
+        if let Some(ride) = self.mechanism.ride {
+            let resting = [ride.bridge, ride.cart].into_iter().filter(|body| mode.motion[*body] == Motion::Stuck);
+            resting.for_each(|body| friction[body] -= self.ridden(mode, y)[body]);
         }
         // A body at rest holds what the phases of a stepper put on it.
         for phased in self.phased.iter().filter(|phased| mode.motion[phased.leader] == Motion::Stuck) {

@@ -1,11 +1,12 @@
-//! The nonlinear forces of a mode: of friction laws, and of springs that follow the bodies.
+//! The nonlinear forces of a mode: of friction laws, of springs that follow the bodies, of steppers, and of a cart on a
+//! bridge that yaws.
 
 use super::bristles::{Bent, Bristles, STIFF};
 use super::model::{Curved, Model, Phased, Sliding, Vector};
 use super::quartic::{AT_KINK, course, crossing, has_slowest, passes, places, polynomial, spread};
 use super::radau::{BACKWARD, C, FOUND, Lane, NODES, POINTS, Slopes, monomials, rest};
 use crate::friction::{Law, Motion, Side};
-use crate::mechanism::{BODIES, DRIVES, PhaseRate, SPRINGS};
+use crate::mechanism::{BODIES, DRIVES, PhaseRate, Ridden, RideLaw, Riding, SPRINGS};
 
 /// Most forces: of friction, of springs, and the torque and the voltages of a stepper.
 pub(super) const SOURCES: usize = BODIES + SPRINGS + 2 * DRIVES;
@@ -34,6 +35,15 @@ pub(super) enum Source {
     Torque(Phasing),
     /// Nonlinear part of the rate of a phase current, by the number of the phase, A/s.
     Phase(usize, Phasing),
+    /// What a cart on a bridge that yaws takes from the force on one of its bodies.
+    Ride { on: Ridden, law: RideLaw, arguments: Riding<Argument> },
+}
+
+/// An argument by its number, and what counts as its zero.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Argument {
+    pub(super) number: usize,
+    pub(super) origin: f64,
 }
 
 /// The numbers of the arguments of a stepper's phases.
@@ -71,13 +81,13 @@ impl Source {
         Source::Spring { following, length, ways, rest, arms }
     }
 
-    /// The force at the beginning of a step.
+    /// The force at the beginning of a step, `value` being that of an argument.
     pub(super) fn at_begin(
         &self,
         model: &Model,
         mode: &crate::mechanism::Mode,
-        input: &[f64; DRIVES],
-        y: &Vector,
+        (input, y): (&[f64; DRIVES], &Vector),
+        value: impl Fn(usize) -> f64,
     ) -> f64 {
         match self {
             Source::Torque(phasing) => model.phased[phasing.phased].torque(y),
@@ -92,6 +102,7 @@ impl Source {
                 model.beyond_straight(curved, mode.motion[curved.body], y)
             }
             Source::Spring { following, .. } => model.beyond(&model.following[*following], y),
+            Source::Ride { on, law, arguments } => law.force(*on, &arguments.map(|own| own.origin + value(own.number))),
         }
     }
 
@@ -137,7 +148,7 @@ impl Source {
                 excess.iter().for_each(|excess| take(crossing(excess, negligible)));
                 return first;
             }
-            Source::Spring { .. } | Source::Torque(_) => return None,
+            Source::Spring { .. } | Source::Torque(_) | Source::Ride { .. } => return None,
         };
         let curved = &model.curved[curved];
         if motion == Motion::Free {
@@ -264,6 +275,9 @@ impl Source {
                 })
             }
             Source::Phase(phase, phasing) => std::array::from_fn(|i| phasing.rate(model, *phase, arguments, i).value),
+            Source::Ride { on, law, arguments: own } => {
+                std::array::from_fn(|i| law.force(*on, &own.map(|own| own.origin + arguments[own.number][i])))
+            }
         }
     }
 
@@ -346,6 +360,14 @@ impl Source {
                 let own = [phasing.angle, phasing.speed, phasing.currents[*phase]];
                 for (number, argument) in own.into_iter().enumerate() {
                     each(argument, &diagonal(&|i| slopes[i][number]));
+                }
+            }
+            Source::Ride { on, law, arguments: own } => {
+                let slopes: [[f64; 7]; NODES] = std::array::from_fn(|i| {
+                    law.slopes(*on, &own.map(|own| own.origin + arguments[own.number][i])).parts()
+                });
+                for (part, argument) in own.parts().into_iter().enumerate() {
+                    each(argument.number, &diagonal(&|i| slopes[i][part]));
                 }
             }
         }

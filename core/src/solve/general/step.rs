@@ -28,8 +28,8 @@ use super::sources::SOURCES;
 use crate::mechanism::{BODIES, DRIVES, SPRINGS};
 use crate::signal::DEGREE;
 
-/// Largest number of arguments of forces: speeds, positions, lengths, currents, inputs.
-pub(super) const ARGUMENTS: usize = 2 * BODIES + SPRINGS + 2 * DRIVES;
+/// Largest number of arguments of forces: speeds, positions, lengths, currents, inputs, accelerations of a ride.
+pub(super) const ARGUMENTS: usize = 2 * BODIES + SPRINGS + 2 * DRIVES + 3;
 
 /// Most columns of what a step depends on.
 const COLUMNS: usize = STATES + 1 + DRIVES * (DEGREE + 1) + SOURCES * POINTS;
