@@ -194,7 +194,7 @@ fn what_is_not_covered_is_named() {
     let gantry = Case::read("stages/core-xy/square.toml").unwrap();
     let (several, design) = family(&gantry, 0.1);
     let found = certificate(&several, &design, [1.8, 1.8]);
-    assert_eq!(found.reason.as_deref(), Some("not certified for several drives"));
+    assert_eq!(found.reason.as_deref(), Some("several drives are not covered"));
     let mut draw = Draw(Pcg64::seed_from_u64(3));
     let current = STRUCTURES.iter().find(|(name, _)| *name == "cascade current").unwrap();
     let (own, design) = loop {
@@ -205,5 +205,5 @@ fn what_is_not_covered_is_named() {
         }
     };
     let found = certificate(&own, &design, [50.0, 50.0]);
-    assert_eq!(found.reason.as_deref(), Some("not certified for a controller that uses the measured current"));
+    assert_eq!(found.reason.as_deref(), Some("a controller that uses the measured current is not covered"));
 }

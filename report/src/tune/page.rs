@@ -38,8 +38,9 @@ pub fn page(work: &Work, text: &str, figures: &[(String, Figure)]) -> Page {
     let [before, after] = told::limiting(work);
     page.prose(format!("Before on {before}, after on {after}."));
     page.subsection("Certificate");
-    let [proven, violated] = told::certificate(work);
-    page.prose(format!("Proven for every machine: {proven}. Violated {violated}."));
+    for line in told::certificate(work) {
+        page.prose(line);
+    }
     for (_, figure) in figures.iter().take(LOOPS) {
         page.figure(figure);
     }

@@ -401,17 +401,17 @@ pub fn family(work: &Work) -> String {
     format!("{off}{loads}{places}: {level}")
 }
 
-/// What is certain about the tuned loop on every machine of the family, in two sentences.
-pub fn certificate(work: &Work) -> [String; 2] {
+/// What is certain about the tuned loop on every machine of the family: what is proven, and the nearest violation.
+pub fn certificate(work: &Work) -> Vec<String> {
     let (family, own) = (&work.tuned.family, &work.tuned.certificate);
     let spread = |factor: f64| match family.source {
         Source::Spread(share) => format!("± {} %", number(100.0 * share * factor, "")),
         Source::Fit | Source::Posterior(_) => format!("{} % of the intervals", number(100.0 * factor, "")),
     };
     let proven = match (&own.reason, own.bounds) {
-        (Some(reason), _) => format!("nothing: {reason}"),
-        (None, Some([ms, mt])) => format!("the whole family, {}: Ms ≤ {ms:.3}, Mt ≤ {mt:.3}", spread(1.0)),
-        (None, None) => format!("the limits hold within {} of all parameters at once", spread(own.factor)),
+        (Some(reason), _) => format!("nothing is proven: {reason}"),
+        (None, Some([ms, mt])) => format!("proven: Ms ≤ {ms:.3}, Mt ≤ {mt:.3} in the whole family, {}", spread(1.0)),
+        (None, None) => format!("proven: the limits hold within {} of all parameters at once", spread(own.factor)),
     };
     let violated = own.violation.as_ref().map(|violation| {
         let (margins, tuning) = (&violation.margins, work.tuning);
@@ -424,9 +424,10 @@ pub fn certificate(work: &Work) -> [String; 2] {
             let at = broken(margins, margins.breaks.complementary, None);
             format!("Mt {:.3} at {}{at}", margins.complementary, hertz(margins.complementary_at))
         };
-        format!("at {}: {what}, with {}", spread(violation.factor), family.words(&violation.corner))
+        format!("violated at {}: {what}, with {}", spread(violation.factor), family.words(&violation.corner))
     });
-    [proven, violated.unwrap_or("by no machine that was found in the family".into())]
+    let none = (own.reason.is_none()).then(|| "violated by no machine that was found in the family".into());
+    std::iter::once(proven).chain(violated.or(none)).collect()
 }
 
 /// The goal of the search.

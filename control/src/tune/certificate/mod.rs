@@ -79,10 +79,10 @@ impl Certificate {
     pub fn of(family: &Family, design: &Design, limits: [f64; 2], stop: &dyn Fn() -> bool) -> Result<Self> {
         let feedback = Feedback::new(design, &family.machine)?;
         if family.machine.drives.len() > 1 {
-            return Ok(Self::none("not certified for several drives"));
+            return Ok(Self::none("several drives are not covered"));
         }
         if !feedback.is_linear() {
-            return Ok(Self::none("not certified for a controller that is not linear"));
+            return Ok(Self::none("a controller that is not linear is not covered"));
         }
         let violation = Search { family, design, feedback: &feedback, limits }.nearest(stop)?;
         if let Some(violation) = violation.as_ref().filter(|violation| violation.factor == 0.0) {
@@ -95,7 +95,7 @@ impl Certificate {
         let own = Self { violation, ..Self::none("nothing could be shown within the budget") };
         let because = |reason: &str| Ok(Self { reason: Some(reason.into()), ..own.clone() });
         if feedback.uses_current() {
-            return because("not certified for a controller that uses the measured current");
+            return because("a controller that uses the measured current is not covered");
         }
         let axis = match Axis::of(family, design, feedback.uses_scale(), stop)? {
             Ok(axis) => axis,
@@ -265,9 +265,15 @@ impl Search<'_> {
         }
         let gentle = self.worst(0.1, &nominal.0)?;
         let mut best: Option<(Corner, f64)> = None;
-        let mut starts = vec![self.scaled(&gentle.0, 1.0), nominal.0];
-        for start in std::mem::take(&mut starts) {
-            let found = self.worst(1.0, &start)?;
+        // What is bad for small deviations alone is not found from the ends of the box.
+        for (factor, start) in [
+            (1.0, &self.scaled(&gentle.0, 1.0)),
+            (1.0, &nominal.0),
+            (0.3, &nominal.0),
+            (0.1, &nominal.0),
+            (0.03, &nominal.0),
+        ] {
+            let found = self.worst(factor, start)?;
             if found.1 > 1.0 {
                 best = self.nearer(best, &found.0)?;
             }
