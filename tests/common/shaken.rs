@@ -3,6 +3,7 @@
 //! The equations are integrated over time (Runge-Kutta, fourth order) and the spectra computed here: nothing is shared
 //! with the fit of `taut shape --belts`.
 
+use super::chance::Chance;
 use std::f64::consts::{PI, TAU};
 
 /// Samples a second of the accelerometer.
@@ -10,36 +11,6 @@ const RATE: f64 = 3200.0;
 
 /// Samples in a segment of a spectrum.
 const SEGMENT: usize = 2048;
-
-/// Random numbers (SplitMix64).
-pub struct Chance(pub u64);
-
-impl Chance {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform from `low` to `high`.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.next() >> 11) as f64 * 2f64.powi(-53)
-    }
-
-    /// Uniform logarithm.
-    fn ratio(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
-    }
-
-    fn sign(&mut self) -> f64 {
-        if self.next() & 1 == 0 { 1.0 } else { -1.0 }
-    }
-
-    fn normal(&mut self) -> f64 {
-        (-2.0 * self.between(1e-12, 1.0).ln()).sqrt() * (TAU * self.between(0.0, 1.0)).cos()
-    }
-}
 
 /// A mode that the model of the fit lacks, along x or y: of the frame, or of the accelerometer's mount.
 #[derive(Debug, Clone, Copy)]

@@ -41,7 +41,7 @@ pub use search::point::{Ending, Strategy};
 pub use search::regression::{Balance, regression};
 pub use search::starts::Work;
 pub use search::triangle::inverse_of_square;
-pub use trust::belts::Belts;
+pub use crate::control::belts::Belts;
 pub use trust::combinations::Combination;
 pub use trust::doubts::{Cause, Disagreement, OtherLaw, Size};
 pub use trust::finding::{Finding, Grade};
