@@ -5,6 +5,9 @@
 
 use super::chance::Chance;
 use std::f64::consts::{PI, TAU};
+use taut::control::diagonals::Diagonals;
+use taut::control::spectrum::{Axis, Spectrum};
+use taut::log::Accelerometer;
 
 /// Samples a second of the accelerometer.
 const RATE: f64 = 3200.0;
@@ -105,8 +108,66 @@ pub enum Disturbed {
 }
 
 impl Disturbed {
-    /// Each of them.
-    pub const ALL: [Self; 5] = [Self::Little, Self::Friction, Self::Frame, Self::Mount, Self::Much];
+    /// Each of them, in words.
+    pub const ALL: [(Self, &'static str); 5] = [
+        (Self::Little, "noise"),
+        (Self::Friction, "dry friction"),
+        (Self::Frame, "a mode of the frame"),
+        (Self::Mount, "a mode of the mount"),
+        (Self::Much, "all of these"),
+    ];
+}
+
+/// How often spectra of drawn machines led to which statement.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Counts {
+    /// Machines.
+    pub machines: usize,
+    /// Machines whose belts differ by at least 5 %.
+    pub unequal: usize,
+    /// Belts that were named the looser ones, those of unequal machines alone, and the wrong ones.
+    pub named: [usize; 2],
+    pub wrong: usize,
+    /// Spectra that no CoreXY fits.
+    pub refused: usize,
+    /// Intervals of the ratio that hold the true one.
+    pub held: usize,
+}
+
+impl Counts {
+    /// Adds another count.
+    pub fn add(&mut self, other: &Self) {
+        self.machines += other.machines;
+        self.unequal += other.unequal;
+        self.named = [self.named[0] + other.named[0], self.named[1] + other.named[1]];
+        self.wrong += other.wrong;
+        self.refused += other.refused;
+        self.held += other.held;
+    }
+}
+
+/// Draws a machine, shakes both of its belts, and counts what `taut shape --belts` states. The ratio is from 0.7 to 1.4,
+/// or 1.
+pub fn judged(seed: u64, disturbed: Disturbed, is_equal: bool) -> Counts {
+    let mut chance = Chance::new(seed);
+    let ratio = if is_equal { 1.0 } else { chance.scaled(0.7, 1.4) };
+    let machine = Machine::drawn(&mut chance, ratio, disturbed);
+    let [a, b] = [0, 1].map(|belt| Spectrum::new(&machine.spectrum(belt, &mut chance), Axis::All));
+    let found = Diagonals::new(&a, &b);
+    let is_unequal = ratio.ln().abs() >= 0.05;
+    let mut counts = Counts { machines: 1, unequal: usize::from(is_unequal), ..Counts::default() };
+    match &found.stated {
+        Ok(belts) => {
+            let [low, high] = belts.interval();
+            counts.held = usize::from(low <= ratio && ratio <= high);
+            if let Some(looser) = belts.looser() {
+                counts.named = [1, usize::from(is_unequal)];
+                counts.wrong = usize::from(is_equal || (looser == 1) != (ratio < 1.0));
+            }
+        }
+        Err(_) => counts.refused = 1,
+    }
+    counts
 }
 
 impl Machine {
@@ -115,36 +176,42 @@ impl Machine {
         let mu = chance.between(0.15, 0.9);
         let highest = 110.0 * mu.sqrt();
         let low = chance.between(25.0, highest.min(75.0).max(26.0));
-        let heavy = chance.ratio(0.3, 1.5);
+        let heavy = chance.scaled(0.3, 1.5);
         let total = (TAU * low).powi(2) * heavy;
         let stiffness = [total / (1.0 + ratio), total * ratio / (1.0 + ratio)];
-        let masses = if chance.sign() > 0.0 { [heavy, mu * heavy] } else { [mu * heavy, heavy] };
+        let masses = if chance.uniform() < 0.5 { [heavy, mu * heavy] } else { [mu * heavy, heavy] };
         // Half of the damping ratio is of the belts, within a third, half of the rails.
-        let zeta = chance.ratio(0.01, 0.1);
+        let zeta = chance.scaled(0.01, 0.1);
         let share = chance.between(0.3, 0.7);
         let of_belt = 2.0 * zeta * share / (TAU * low);
-        let damping = stiffness.map(|k| k * of_belt * chance.ratio(0.8, 1.25));
-        let viscous = masses.map(|m| 2.0 * zeta * (1.0 - share) * (total * m).sqrt() * chance.ratio(0.6, 1.6));
+        let damping = stiffness.map(|k| k * of_belt * chance.scaled(0.8, 1.25));
+        let viscous = masses.map(|m| 2.0 * zeta * (1.0 - share) * (total * m).sqrt() * chance.scaled(0.6, 1.6));
         let has = |kind| disturbed == kind || disturbed == Disturbed::Much;
         let coulomb = masses.map(|m| m * chance.between(0.2, 2.0));
         let coulomb = if has(Disturbed::Friction) { coulomb } else { [0.0; 2] };
         let mut mode = |mass: f64, low: f64, high: f64| Mode {
-            along: usize::from(chance.sign() > 0.0),
+            along: usize::from(chance.uniform() < 0.5),
             mass,
             frequency: chance.between(low, high),
-            damping: chance.ratio(0.01, 0.1),
+            damping: chance.scaled(0.01, 0.1),
         };
         let frame = mode(heavy, 10.0, 150.0);
         let mount = mode(mu * heavy, 60.0, 180.0);
         let frame = has(Disturbed::Frame).then(|| Mode { mass: heavy * chance.between(3.0, 15.0), ..frame });
         let mount = has(Disturbed::Mount).then(|| Mode { mass: mu * heavy * chance.between(0.1, 0.4), ..mount });
         let skew = chance.between(-2.0, 2.0) * PI / 180.0;
-        Self { mass: masses, stiffness, damping, viscous, coulomb, frame, mount, skew, noise: 0.15, sweep: [5.0, 133.3, 1.0] }
-    }
-
-    /// The ratio of stiffness, belt B to belt A.
-    pub fn ratio(&self) -> f64 {
-        self.stiffness[1] / self.stiffness[0]
+        Self {
+            mass: masses,
+            stiffness,
+            damping,
+            viscous,
+            coulomb,
+            frame,
+            mount,
+            skew,
+            noise: 0.15,
+            sweep: [5.0, 133.3, 1.0],
+        }
     }
 
     /// Derivatives of x, y, frame, mount and their speeds, when a motor has moved its belt by `moved` (m) at `speed`.
@@ -217,19 +284,24 @@ impl Machine {
         rows
     }
 
-    /// The spectrum of a test in the form of Klipper's `resonances_*.csv`, (mm/s²)²/Hz.
-    pub fn file(&self, diagonal: usize, chance: &mut Chance) -> String {
-        let densities = self.shaken(diagonal, chance).map(|values| density(&values));
-        let mut text = String::from("freq,psd_x,psd_y,psd_z,psd_xyz\n");
-        for k in 0..SEGMENT / 2 {
-            let f = k as f64 * RATE / SEGMENT as f64;
-            if f > 200.0 {
-                break;
-            }
-            let [x, y, z] = [0, 1, 2].map(|axis: usize| 1e6 * densities[axis][k]);
-            text += &format!("{f:.1},{x:.3e},{y:.3e},{z:.3e},{:.3e}\n", x + y + z);
-        }
-        text
+    /// The spectrum of a test, (mm/s²)²/Hz, with frequencies rounded to 0.1 Hz as Klipper writes them.
+    pub fn spectrum(&self, belt: usize, chance: &mut Chance) -> Accelerometer {
+        let [x, y, z] = self.shaken(belt, chance).map(|values| density(&values));
+        let step = RATE / SEGMENT as f64;
+        let count = (200.0 / step) as usize + 1;
+        let frequency = (0..count).map(|k| (10.0 * k as f64 * step).round() / 10.0).collect();
+        let all: Vec<f64> = x.iter().zip(&y).zip(&z).map(|((x, y), z)| x + y + z).collect();
+        let density = [x, y, z, all].map(|values| values[..count].iter().map(|value| 1e6 * value).collect());
+        Accelerometer::Spectrum { frequency, density, per_frequency: false }
+    }
+
+    /// That spectrum in the form of Klipper's `resonances_*.csv`.
+    pub fn file(&self, belt: usize, chance: &mut Chance) -> String {
+        let Accelerometer::Spectrum { frequency, density: [x, y, z, all], .. } = self.spectrum(belt, chance) else {
+            unreachable!()
+        };
+        let row = |k: usize| format!("{:.1},{:.3e},{:.3e},{:.3e},{:.3e}\n", frequency[k], x[k], y[k], z[k], all[k]);
+        std::iter::once("freq,psd_x,psd_y,psd_z,psd_xyz\n".into()).chain((0..frequency.len()).map(row)).collect()
     }
 }
 

@@ -173,20 +173,16 @@ impl Diagonals {
         let model = data.model(&v);
         let belts = Belts { sides: Sides::Belts, ratio: v[RATIO].exp(), error };
         let stated = match () {
-            () if model.misfit > MISFIT => {
-                Err(format!(
-                    "the curves of a CoreXY with two belts miss the spectra by {} % (at most {} %)",
-                    significant(100.0 * model.misfit.exp_m1(), 2),
-                    significant(100.0 * MISFIT.exp_m1(), 2)
-                ))
-            }
-            () if model.turned.abs() > TURNED => {
-                Err(format!(
-                    "the curves of a CoreXY fit only with an accelerometer that is turned by {}° about z (at most {}°)",
-                    significant(model.turned.abs().to_degrees(), 2),
-                    significant(TURNED.to_degrees(), 2)
-                ))
-            }
+            () if model.misfit > MISFIT => Err(format!(
+                "the curves of a CoreXY with two belts miss the spectra by {} % (at most {} %)",
+                significant(100.0 * model.misfit.exp_m1(), 2),
+                significant(100.0 * MISFIT.exp_m1(), 2)
+            )),
+            () if model.turned.abs() > TURNED => Err(format!(
+                "the curves of a CoreXY fit only with an accelerometer that is turned by {}° about z (at most {}°)",
+                significant(model.turned.abs().to_degrees(), 2),
+                significant(TURNED.to_degrees(), 2)
+            )),
             () => Ok(belts),
         };
         Self { stated, model: Some(model) }
@@ -476,7 +472,8 @@ impl Linear {
     /// Factor on the variances: the reduced squares, at least 1, times that of correlated neighbours, 1 + 2 Σ ρ_k up to
     /// the first negative ρ_k.
     fn growth(&self, tests: &[Test; 2]) -> f64 {
-        let weighted: Vec<f64> = self.residuals.iter().zip(&self.weights).map(|(r, weight)| r * weight.sqrt()).collect();
+        let weighted: Vec<f64> =
+            self.residuals.iter().zip(&self.weights).map(|(r, weight)| r * weight.sqrt()).collect();
         let total: f64 = weighted.iter().map(|r| r * r).sum();
         let mut parts = Vec::new();
         let mut rest = weighted.as_slice();
@@ -488,7 +485,8 @@ impl Linear {
             }
         }
         let at_lag = |lag: usize| {
-            let sum: f64 = parts.iter().flat_map(|part| part.iter().zip(part.iter().skip(lag))).map(|(a, b)| a * b).sum();
+            let sum: f64 =
+                parts.iter().flat_map(|part| part.iter().zip(part.iter().skip(lag))).map(|(a, b)| a * b).sum();
             sum / total.max(f64::MIN_POSITIVE)
         };
         let correlated: f64 = (1..=6).map(at_lag).take_while(|correlation| *correlation > 0.0).sum();

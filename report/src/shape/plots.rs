@@ -52,7 +52,9 @@ fn belt(letter: &str, curve: &Curve) -> Figure {
         let fitted = series(format!("CoreXY along {name}"), &curve.fitted[axis]).colour(colour(0)).style(Style::Dashed);
         figure = figure.panel(Panel::new(Axis::new("Density", "(mm/s^2)^2/Hz")).series(measured).series(fitted));
     }
-    figure.caption("The acceleration while the motor of this belt shakes and the other holds, and the curve of the CoreXY.")
+    figure.caption(
+        "The acceleration while the motor of this belt shakes and the other holds, and the curve of the CoreXY.",
+    )
 }
 
 fn density() -> Axis {
