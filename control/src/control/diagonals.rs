@@ -92,7 +92,7 @@ const BRIEF: usize = 12;
 const THOROUGH: usize = 30;
 /// Standard error of ln(k_B/k_A) that the model's simplifications add: a constant, and relative to the residual. Chosen
 /// so that intervals hold with dry friction and modes of frame and mount (`cargo xtask faults`).
-const MODEL_ERROR: [f64; 2] = [0.005, 0.1];
+const MODEL_ERROR: [f64; 2] = [0.01, 0.2];
 /// Greatest root mean square of the residual logarithms.
 const MISFIT: f64 = 0.4;
 /// Greatest angle of the accelerometer, rad.
