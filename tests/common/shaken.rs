@@ -175,7 +175,7 @@ impl Machine {
     pub fn drawn(chance: &mut Chance, ratio: f64, disturbed: Disturbed) -> Self {
         let mu = chance.between(0.15, 0.9);
         let highest = 110.0 * mu.sqrt();
-        let low = chance.between(25.0, highest.min(75.0).max(26.0));
+        let low = chance.between(25.0, highest.clamp(26.0, 75.0));
         let heavy = chance.scaled(0.3, 1.5);
         let total = (TAU * low).powi(2) * heavy;
         let stiffness = [total / (1.0 + ratio), total * ratio / (1.0 + ratio)];
