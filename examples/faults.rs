@@ -1,12 +1,14 @@
-//! Logs with a known fault, and logs that are as they should be: how many of them `taut fit` warns about.
+//! Logs with a known fault, and logs that are as they should be: how many of them `taut fit` warns about. With
+//! `--belts`, spectra of CoreXY printers instead: how often `taut shape --belts` names the looser belt.
 //!
-//! `cargo xtask faults [--seeds N] [--seed N] [--words]` prints a table.
+//! `cargo xtask faults [--seeds N] [--seed N] [--words] [--belts]` prints a table.
 
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
 use std::process::ExitCode;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use taut::case::{Case, Plan, TEMPLATE};
 use taut::chance::normal;
 use taut::fit::fit;
@@ -23,6 +25,11 @@ const COUNTS: f64 = 2048.0;
 
 /// The free parameters.
 const KEYS: [&str; 3] = ["cart.friction.viscous", "cart.friction.coulomb", "cart.mass"];
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use common::shaken::{Counts, Disturbed, judged};
 
 struct Chance(Pcg64);
 
@@ -237,8 +244,55 @@ fn made(fault: Fault, seed: u64) -> Case {
     case
 }
 
+/// Prints a table of the statements about belts, of so many machines with each kind of disturbance.
+fn belts(seeds: u64, seed: u64) -> ExitCode {
+    println!("| spectra | named | of these wrong | refused | undecided | interval holds the ratio |");
+    println!("|---|---|---|---|---|---|");
+    let mut all = [Counts::default(), Counts::default()];
+    for (disturbed, name) in Disturbed::ALL {
+        for is_equal in [false, true] {
+            let next = AtomicU64::new(0);
+            let worker = || {
+                let mut counts = Counts::default();
+                loop {
+                    let k = next.fetch_add(1, Ordering::Relaxed);
+                    if k >= seeds {
+                        return counts;
+                    }
+                    counts.add(&judged(seed.wrapping_mul(1_000_003) + k, disturbed, is_equal));
+                }
+            };
+            let mut counts = Counts::default();
+            std::thread::scope(|scope| {
+                let count = std::thread::available_parallelism().map_or(1, usize::from);
+                let workers: Vec<_> = (0..count).map(|_| scope.spawn(worker)).collect();
+                workers.into_iter().for_each(|one| counts.add(&one.join().unwrap_or_default()));
+            });
+            all[usize::from(is_equal)].add(&counts);
+            row(&format!("{name}, belts {}", if is_equal { "alike" } else { "from 0.7 to 1.4" }), &counts);
+        }
+    }
+    row("all, belts from 0.7 to 1.4", &all[0]);
+    row("all, belts alike", &all[1]);
+    let [unequal, alike] = &all;
+    println!("{} of {} belts that differ by 5 % or more are named", unequal.named[1], unequal.unequal);
+    // 97.6 % of the named belts are right, and at most 5 % of those that are alike are named.
+    let is_good =
+        unequal.wrong as f64 <= 0.024 * unequal.named[0] as f64 && alike.wrong as f64 <= 0.05 * seeds as f64 * 5.0;
+    if is_good { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+fn row(name: &str, counts: &Counts) {
+    let &Counts { machines, named: [named, _], wrong, refused, held, .. } = counts;
+    let undecided = machines - named - refused;
+    println!(
+        "| {name} | {named} of {machines} | {wrong} | {refused} | {undecided} | {held} of {} |",
+        machines - refused
+    );
+}
+
 fn main() -> ExitCode {
-    let (mut seeds, mut seed, mut aloud) = (10, 1, false);
+    let (mut seeds, mut seed, mut aloud, mut of_belts) = (10, 1, false, false);
     let mut words = std::env::args().skip(1);
     while let Some(word) = words.next() {
         let number = |value: Option<String>| value.and_then(|value| value.parse::<u64>().ok());
@@ -246,11 +300,15 @@ fn main() -> ExitCode {
             "--seeds" => seeds = number(words.next()).unwrap_or(seeds),
             "--seed" => seed = number(words.next()).unwrap_or(seed),
             "--words" => aloud = true,
+            "--belts" => of_belts = true,
             _ => {
-                eprintln!("usage: cargo xtask faults [--seeds N] [--seed N] [--words]");
+                eprintln!("usage: cargo xtask faults [--seeds N] [--seed N] [--words] [--belts]");
                 return ExitCode::from(2);
             }
         }
+    }
+    if of_belts {
+        return belts(seeds, seed);
     }
     println!("| log | found | warned of something | exit 0 |");
     println!("|---|---|---|---|");

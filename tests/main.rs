@@ -64,6 +64,7 @@ mod rows;
 mod sensitivity;
 mod set_values;
 mod shape;
+mod shape_of_belts;
 mod shape_of_modes;
 mod sheet;
 mod stages;

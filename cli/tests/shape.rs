@@ -111,6 +111,37 @@ fn mistakes_have_their_messages() {
     }
 }
 
+#[path = "../../tests/common/chance.rs"]
+#[allow(dead_code)]
+mod chance;
+#[path = "../../tests/common/shaken.rs"]
+#[allow(dead_code)]
+mod shaken;
+
+/// Spectra of two belts, of which the second is looser: on the terminal, as JSON, and in the report.
+#[test]
+fn the_looser_of_two_belts() {
+    let mut chance = chance::Chance::new(5);
+    let machine = shaken::Machine::drawn(&mut chance, 0.82, shaken::Disturbed::Little);
+    let folder = tempfile::tempdir().unwrap();
+    let files = ["a.csv", "b.csv"].map(|name| folder.path().join(name));
+    for (belt, file) in files.iter().enumerate() {
+        std::fs::write(file, machine.file(belt, &mut chance)).unwrap();
+    }
+    let out = folder.path().join("out");
+    let [a, b, to] = [&files[0], &files[1], &out].map(|path| path.to_str().unwrap());
+    let value = json(&["--belts", a, b, "--out", to]);
+    assert_eq!(value["belts"]["looser"], "belt B");
+    let ratio = value["belts"]["stiffness_ratio"].as_f64().unwrap();
+    assert!((ratio / 0.82 - 1.0).abs() < 0.02, "{ratio}");
+    assert!(["plots/belt-a.svg", "plots/belt-b.svg"].iter().all(|name| out.join(name).is_file()));
+    let words = value["belts"]["words"].as_str().unwrap();
+    let report = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(words.starts_with("belt B is looser than belt A: ") && report.contains(words), "{words}");
+    // Without the option nothing is stated.
+    assert!(json(&[a, b])["belts"].is_null());
+}
+
 #[test]
 fn mistakes_end_with_status_2() {
     let case = "stages/printer-axis/printer-axis.toml";
@@ -127,6 +158,7 @@ fn mistakes_end_with_status_2() {
         vec![case, "--shapers", "zw"],
         vec![case, "--uncertainty", "10"],
         vec![bad, "--motor", "free"],
+        vec![case, "--belts"],
     ] {
         let output = taut_in(root()).arg("shape").args(&arguments).output().unwrap();
         assert_eq!(output.status.code(), Some(2), "{arguments:?}");

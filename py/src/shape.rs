@@ -28,6 +28,7 @@ pub struct Options {
     motor: Option<String>,
     changes: Vec<String>,
     pairs: bool,
+    belts: bool,
 }
 
 /// The JSON that `taut shape --json` prints of these files.
@@ -62,6 +63,7 @@ pub fn shape<'py>(py: Python<'py>, files: Vec<PathBuf>, options: Options) -> PyR
         uncertainty: within("uncertainty", options.uncertainty, 0.0, 0.5)?,
         drive: drive.map(|place| [Drive::Held, Drive::Free][place]),
         pairs: options.pairs,
+        belts: options.belts,
     };
     let found = unlocked(py, || recommend(&question, &files))?.told(py)?;
     value::json(py, &guarded(|| json::shape(&found))?)

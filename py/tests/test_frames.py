@@ -260,3 +260,6 @@ def test_shapers_are_the_command_lines(root):
         taut.shape(root / "stages/printer-axis/printer-axis.toml", firmware="marlin")
     with pytest.raises(taut.Error, match="no file was given"):
         taut.shape([])
+    assert found.belts is None
+    with pytest.raises(taut.Error, match="a case file has no spectra of two belts"):
+        taut.shape(root / "stages/printer-axis/printer-axis.toml", belts=True)

@@ -2,6 +2,7 @@
 
 use super::number;
 use crate::case::Case;
+use crate::control::belts::Belts;
 use crate::fit::{Cause, Combination, Estimate, Finding, Fit, Group, Profile, Score, Size};
 use serde_json::{Value, json};
 
@@ -45,6 +46,18 @@ fn cause(found: &Cause) -> Value {
         "add": found.add,
         "parts_better": found.better[0],
         "parts": found.better[1],
+    })
+}
+
+/// The statement of the looser belt.
+pub(super) fn belts(belts: &Belts) -> Value {
+    let names = belts.sides.names();
+    json!({
+        "drives": names,
+        "stiffness_ratio": number(belts.ratio),
+        "interval_95": belts.interval().map(number),
+        "looser": belts.looser().map(|side| names[side]),
+        "words": belts.words(),
     })
 }
 
@@ -145,13 +158,7 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
         "variables": fit.variables,
         "parameters": parameters,
         "not_determined": not_determined,
-        "belts": fit.belts().map(|belts| json!({
-            "drives": belts.drives,
-            "stiffness_ratio": number(belts.ratio),
-            "interval_95": belts.interval().map(number),
-            "looser": belts.looser().map(|drive| belts.drives[drive]),
-            "words": belts.words(),
-        })),
+        "belts": fit.belts().map(belts),
         "disagreement": fit.disagreement.as_ref().map(|found| json!({
             "windows": found.windows,
             "length_s": number(found.length),

@@ -1,6 +1,10 @@
 //! Input shapers: `taut shape --json`, `shape.json`.
 
+use super::fit;
+use super::number;
+use crate::control::belts::{Belts, Sides};
 use crate::control::compare::{Comparison, Pair};
+use crate::control::diagonals::{Curve, Diagonals, Model};
 use crate::control::pairs;
 use crate::control::recommendation::{Findings, Found, Left, Source};
 use crate::control::shaper::Shaper;
@@ -17,6 +21,7 @@ pub fn shape(found: &Findings) -> Value {
     value["version"] = json!(env!("CARGO_PKG_VERSION"));
     value["second"] = found.each.get(1).map_or(Value::Null, one);
     value["comparison"] = found.comparison.as_ref().map_or(Value::Null, comparison);
+    value["belts"] = found.belts.as_ref().map_or(Value::Null, belts);
     value
 }
 
@@ -125,6 +130,26 @@ fn left(left: &Left) -> Value {
 
 fn peaks(peaks: &[(f64, f64)]) -> Value {
     peaks.iter().map(|(f, p)| json!({ "frequency": f, "density": p })).collect()
+}
+
+/// The statement in the form that fits have, with its model.
+fn belts(found: &Diagonals) -> Value {
+    let open = Belts { sides: Sides::Belts, ratio: f64::NAN, error: f64::INFINITY };
+    let mut value = fit::belts(found.stated.as_ref().unwrap_or(&open));
+    value["words"] = json!(found.words());
+    value["refusal"] = json!(found.stated.as_ref().err());
+    value["model"] = found.model.as_ref().map_or(Value::Null, |model| {
+        let Model { frequencies, mass_ratio, misfit, turned, curves } = model;
+        let curve = |Curve { frequency, measured, fitted }: &Curve| json!({ "frequency": frequency, "measured": measured, "fitted": fitted });
+        json!({
+            "frequencies": frequencies,
+            "mass_ratio": number(*mass_ratio),
+            "misfit": number(*misfit),
+            "turned": number(*turned),
+            "curves": curves.each_ref().map(curve),
+        })
+    });
+    value
 }
 
 fn comparison(comparison: &Comparison) -> Value {

@@ -8,6 +8,7 @@ pub mod ignored;
 pub mod logged;
 pub mod loops;
 pub mod random;
+pub mod shaken;
 pub mod stability;
 pub mod truths;
 pub mod wrong;

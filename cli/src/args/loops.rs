@@ -234,6 +234,10 @@ pub struct Shape {
     /// Also try pairs of shapers in series: for two modes, or for a mode that varies along the travel
     #[arg(long)]
     pub pairs: bool,
+    /// Two spectra of a CoreXY, TEST_RESONANCES AXIS=1,1 (belt A) and AXIS=1,-1 (belt B): report which belt is looser and
+    /// by how much
+    #[arg(long)]
+    pub belts: bool,
     /// Case files only: relative uncertainty of the frequencies [default: 0.1]
     #[arg(long, value_name = "PART", value_parser = uncertainty)]
     pub uncertainty: Option<f64>,
@@ -293,6 +297,7 @@ Examples:
   taut shape resonances_x_20210821_152037.csv --out shaped
   taut shape raw_data_x.csv --axis x --max-smoothing \"0.15 mm\"
   taut shape belt_a.csv belt_b.csv
+  taut shape --belts resonances_belt_a.csv resonances_belt_b.csv
   taut shape --together raw_data_x_left.csv raw_data_x_middle.csv raw_data_x_right.csv
   taut shape raw_data_x.csv --shapers \"mzv(n=4,t=0.9),ei(v_tol=0.02)\" --max-vibrations 2
   taut shape axis.toml --set cart.mass=\"0.5 kg\" --json | jq .recommended";

@@ -55,5 +55,6 @@ fn question(args: &Args) -> Question {
             MotorName::Held => Drive::Held,
         }),
         pairs: args.pairs,
+        belts: args.belts,
     }
 }

@@ -32,6 +32,13 @@ pub fn text(found: &Findings) -> String {
         }
         text.push('\n');
     }
+    if let Some(belts) = &found.belts {
+        let _ = write!(text, "{}\n{}\n", bold("Belts"), belts.words());
+        if let Some(told) = belts.model_words() {
+            let _ = writeln!(text, "{told}");
+        }
+        text.push('\n');
+    }
     text
 }
 

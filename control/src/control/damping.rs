@@ -30,7 +30,7 @@ const LEAST: f64 = 1e-3;
 const MOST: f64 = 0.5;
 
 /// Distances in bins at which the window counts.
-const REACH: f64 = 3.0;
+pub(super) const REACH: f64 = 3.0;
 const PARTS: i32 = 30;
 
 /// A mode fitted to a spectrum.
@@ -64,7 +64,7 @@ pub fn fitted(spectrum: &Spectrum) -> Option<FittedMode> {
     if bins.len() < FEWEST || width.is_nan() || width <= 0.0 {
         return None;
     }
-    let kernel = kernel();
+    let kernel = kernel(PARTS);
     let at = |f: f64, zeta: f64| squares(&bins, &kernel, width, f, zeta);
     let (mut best, mut steps): ((f64, f64), (f64, f64)) =
         ((top, 0.05), (0.06 * top / f64::from(GRID) * 2.0, (MOST / LEAST).ln() / f64::from(GRID)));
@@ -104,8 +104,8 @@ pub fn fitted(spectrum: &Spectrum) -> Option<FittedMode> {
     Some(FittedMode { frequency: best.0, damping: best.1, interval: [edge(-1.0), edge(1.0)], error })
 }
 
-/// Weights of the window at distances in bins.
-fn kernel() -> Vec<(f64, f64)> {
+/// Weights of the window at distances up to [`REACH`] bins, which have `parts` steps.
+pub(super) fn kernel(parts: i32) -> Vec<(f64, f64)> {
     let at = |delta: f64| {
         let inside = BETA * BETA - (PI * delta).powi(2);
         let root = inside.abs().sqrt();
@@ -117,7 +117,7 @@ fn kernel() -> Vec<(f64, f64)> {
         w * w
     };
     let all: Vec<(f64, f64)> =
-        (-PARTS..=PARTS).map(|k| REACH * f64::from(k) / f64::from(PARTS)).map(|delta| (delta, at(delta))).collect();
+        (-parts..=parts).map(|k| REACH * f64::from(k) / f64::from(parts)).map(|delta| (delta, at(delta))).collect();
     let sum: f64 = all.iter().map(|one| one.1).sum();
     all.into_iter().map(|(delta, w)| (delta, w / sum)).collect()
 }

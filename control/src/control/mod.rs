@@ -9,10 +9,12 @@
 
 mod accuracy;
 mod at_samples;
+pub mod belts;
 pub mod compare;
 mod contour;
 mod criterion;
 pub mod damping;
+pub mod diagonals;
 pub mod drives;
 pub mod fed;
 pub mod feedback;

@@ -3,6 +3,7 @@
 
 use super::compare::{Comparison, compare};
 use super::damping::{FittedMode, fitted};
+use super::diagonals::Diagonals;
 use super::shaper::{Firmware, Form, residual_vibration};
 use super::shaping::{Choice, Criterion, Target, choose};
 use super::spectrum::{Axis, Spectrum};
@@ -71,6 +72,8 @@ pub struct Findings {
     pub each: Vec<Found>,
     /// Comparison of two spectra.
     pub comparison: Option<Comparison>,
+    /// The looser of two belts, if it was asked for.
+    pub belts: Option<Diagonals>,
 }
 
 /// Options of a recommendation; see `taut shape`.
@@ -100,6 +103,8 @@ pub struct Question {
     pub drive: Option<Drive>,
     /// True if convolved pairs of shapers are also tried.
     pub pairs: bool,
+    /// True if the two spectra are those of belts A and B of a CoreXY.
+    pub belts: bool,
 }
 
 /// A damping ratio that is given, or fitted to the highest peak.
@@ -112,8 +117,8 @@ pub enum Damping {
 }
 
 /// Reads files of vibration (spectra, samples of an accelerometer, or cases), chooses shapers, and compares two
-/// spectra. Errors: more than two files that are not taken together, files that cannot be read, options that do not fit
-/// them or the firmware.
+/// spectra, with `belts` for the looser belt of a CoreXY. Errors: more than two files that are not taken together, files
+/// that cannot be read, options that do not fit them or the firmware.
 ///
 /// ```no_run
 /// use taut::control::recommendation::{Question, recommend};
@@ -125,6 +130,9 @@ pub fn recommend(args: &Question, files: &[PathBuf]) -> Result<Findings> {
     let Some(_) = files.first() else {
         return Err(Error::new("no file was given").next("name a spectrum, samples of an accelerometer, or a case"));
     };
+    if args.belts {
+        are_of_belts(args, files)?;
+    }
     if files.len() > 2 && !args.together {
         let error = Error::new(format!("{} files, of which two can be compared", files.len())).in_file("taut shape");
         return Err(error.next("say --together to choose one shaper for all of them"));
@@ -143,7 +151,53 @@ pub fn recommend(args: &Question, files: &[PathBuf]) -> Result<Findings> {
         }
         _ => None,
     };
-    Ok(Findings { each, comparison })
+    let belts = match each.as_slice() {
+        [a @ Found { source: Source::Spectrum(first), .. }, b @ Found { source: Source::Spectrum(second), .. }]
+            if args.belts =>
+        {
+            moves_along_both(&a.file, first)?;
+            moves_along_both(&b.file, second)?;
+            Some(Diagonals::new(first, second))
+        }
+        _ => None,
+    };
+    Ok(Findings { each, comparison, belts })
+}
+
+/// The two tests of `--belts`, for messages.
+const DIAGONALS: &str = "the spectra of TEST_RESONANCES AXIS=1,1 and AXIS=1,-1, in this order";
+
+/// Checks that exactly two spectra were given, without options that contradict.
+fn are_of_belts(args: &Question, files: &[PathBuf]) -> Result<()> {
+    if let Some(file) = files.iter().find(|file| is_case(file)) {
+        let error = Error::new("a case file has no spectra of two belts").in_file(file);
+        return Err(error.next(format!("leave --belts out, or give {DIAGONALS}")));
+    }
+    let contradicts = [
+        ("--together", args.together, "--belts compares two spectra, --together joins them"),
+        ("--axis", args.axis.is_some(), "--belts evaluates x and y of each spectrum"),
+    ];
+    if let Some((option, _, what)) = contradicts.into_iter().find(|(_, given, _)| *given) {
+        return Err(Error::new(what).in_file(option).next(format!("leave {option} out")));
+    }
+    if files.len() != 2 {
+        let count = if files.len() == 1 { "1 file".into() } else { format!("{} files", files.len()) };
+        let error = Error::new(format!("{count} for two belts")).in_file("--belts").allowed("two spectra");
+        return Err(error.next(format!("give {DIAGONALS}")));
+    }
+    Ok(())
+}
+
+/// Checks that x and y have a content.
+fn moves_along_both(file: &Path, spectrum: &Spectrum) -> Result<()> {
+    for (axis, values) in [Axis::X, Axis::Y].into_iter().zip(&spectrum.axes) {
+        if values.iter().all(|value| *value <= 0.0) {
+            let what = format!("no vibration along {} from 5 to 200 Hz", axis.word());
+            let error = Error::new(what).in_file(file).allowed("densities above 0 along x and y for --belts");
+            return Err(error.next(format!("give {DIAGONALS}, of an accelerometer on the toolhead")));
+        }
+    }
+    Ok(())
 }
 
 /// One shaper for all files.

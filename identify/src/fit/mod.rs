@@ -28,6 +28,7 @@ pub mod least_squares {
 }
 
 pub use crate::case::{drawn, machines};
+pub use crate::control::belts::Belts;
 pub use asked::problem::{Problem, Stop};
 pub use asked::run::{Extra, MeasuredOutput, Nuisance, Run};
 pub use check::{Check, check, check_watched};
@@ -41,7 +42,6 @@ pub use search::point::{Ending, Strategy};
 pub use search::regression::{Balance, regression};
 pub use search::starts::Work;
 pub use search::triangle::inverse_of_square;
-pub use trust::belts::Belts;
 pub use trust::combinations::Combination;
 pub use trust::doubts::{Cause, Disagreement, OtherLaw, Size};
 pub use trust::finding::{Finding, Grade};

@@ -44,6 +44,12 @@ class Shape:
         return list(self.data["pairs"])
 
     @property
+    def belts(self) -> dict[str, Any] | None:
+        """Which belt is ``looser``, the ``stiffness_ratio`` (belt B to belt A) with its ``interval_95``, and ``words``;
+        ``None`` unless ``belts=True`` was said."""
+        return self.data["belts"]
+
+    @property
     def pair_line(self) -> str | None:
         """The line for ``[controller]`` of a case, where a pair is clearly better than the recommended shaper."""
         best = self.data["recommended_pair"]
@@ -95,6 +101,7 @@ def shape(
     uncertainty: float | None = None,
     motor: str | None = None,
     pairs: bool = False,
+    belts: bool = False,
     changes: Mapping[str, Any] | None = None,
 ) -> Shape:
     """An input shaper from one file of vibration, two that are compared, or several ``together``.
@@ -105,7 +112,7 @@ def shape(
     ``shapers`` are names to choose among. Of a case, ``uncertainty`` is by which share its frequencies may be off,
     ``motor`` is ``held`` or ``free``, and ``changes`` are values by key, as of :meth:`taut.Case.changed`. With
     ``pairs`` two shapers one behind the other are looked at, too: for two modes, or for one that moves far along the
-    travel.
+    travel. With ``belts`` the two files are those of belts A and B of a CoreXY, and ``Shape.belts`` has the looser one.
     """
     paths = [files] if isinstance(files, (str, PathLike)) else list(files)
     fitted = isinstance(damping, str)
@@ -126,6 +133,7 @@ def shape(
         "uncertainty": _checks.number("uncertainty", uncertainty),
         "motor": _checks.word("motor", motor),
         "pairs": bool(pairs),
+        "belts": bool(belts),
         "changes": [change(key, value) for key, value in (changes or {}).items()],
     }
     return Shape(_native.shape([_checks.path(path) for path in paths], options))

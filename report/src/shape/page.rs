@@ -1,5 +1,6 @@
 //! The report: one HTML file.
 
+use super::plots::BELT;
 use super::rows::{mode_words, pair_words, remark, words};
 use crate::{Callout, Cell, Figure, Page, Table};
 use taut::control::compare::Comparison;
@@ -22,7 +23,7 @@ pub fn page(found: &Findings, figures: &[(String, Figure)]) -> Page {
         shapers(&mut page, one);
         pairs(&mut page, one);
         modes(&mut page, one);
-        for (name, figure) in figures.iter().filter(|(name, _)| name != "compared") {
+        for (name, figure) in figures.iter().filter(|(name, _)| name != "compared" && !name.starts_with(BELT)) {
             if name.ends_with("-2") == (i == 1) {
                 page.figure(figure);
             }
@@ -33,6 +34,16 @@ pub fn page(found: &Findings, figures: &[(String, Figure)]) -> Page {
         compared(&mut page, comparison);
     }
     for (_, figure) in figures.iter().filter(|(name, _)| name == "compared") {
+        page.figure(figure);
+    }
+    if let Some(belts) = &found.belts {
+        page.section("Belts");
+        page.prose(format!("{}.", belts.words()));
+        if let Some(told) = belts.model_words() {
+            page.prose(format!("{told}."));
+        }
+    }
+    for (_, figure) in figures.iter().filter(|(name, _)| name.starts_with(BELT)) {
         page.figure(figure);
     }
     page.version();

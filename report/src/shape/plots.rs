@@ -1,6 +1,7 @@
 //! Spectra with and without shapers, what shapers leave at each frequency, and modes along the travel.
 
 use crate::{Axis, Colour, Figure, Panel, Series, Style};
+use taut::control::diagonals::Curve;
 use taut::control::recommendation::{Findings, Found, Source, damping};
 use taut::control::shaping::Target;
 use taut::control::spectrum::Spectrum;
@@ -31,7 +32,29 @@ pub fn figures(found: &Findings) -> Vec<(String, Figure)> {
     {
         figures.push(("compared".into(), compared(found, first, second)));
     }
+    if let Some(model) = found.belts.as_ref().and_then(|belts| belts.model.as_ref()) {
+        for (curve, letter) in model.curves.iter().zip(["a", "b"]) {
+            figures.push((format!("{BELT}{letter}"), belt(letter, curve)));
+        }
+    }
     figures
+}
+
+/// How names of figures of belts begin.
+pub const BELT: &str = "belt-";
+
+/// Measured and fitted densities along x and y while one belt is shaken.
+fn belt(letter: &str, curve: &Curve) -> Figure {
+    let mut figure = Figure::new(format!("Belt {}", letter.to_uppercase()), Axis::new("Frequency", "Hz"));
+    for (axis, name) in ["x", "y"].iter().enumerate() {
+        let series = |name: String, values: &[f64]| Series::new(name, curve.frequency.clone(), values.to_vec());
+        let measured = series(format!("measured along {name}"), &curve.measured[axis]).colour(Colour::Ink);
+        let fitted = series(format!("CoreXY along {name}"), &curve.fitted[axis]).colour(colour(0)).style(Style::Dashed);
+        figure = figure.panel(Panel::new(Axis::new("Density", "(mm/s^2)^2/Hz")).series(measured).series(fitted));
+    }
+    figure.caption(
+        "The acceleration while the motor of this belt shakes and the other holds, and the curve of the CoreXY.",
+    )
 }
 
 fn density() -> Axis {

@@ -1,11 +1,11 @@
 //! Result of a fit with its uncertainty.
 
-use super::belts::Belts;
 use super::combinations::Combination;
 use super::doubts::{Cause, Disagreement, OtherLaw};
 use super::finding::{Finding, Grade};
 use super::identify::Identifiability;
 use super::scores::LogFit;
+use crate::control::belts::Belts;
 use crate::fit::noise::Wave;
 use crate::fit::search::point::{Ending, Strategy};
 use crate::fit::search::starts::Work;
@@ -136,7 +136,7 @@ impl Fit {
     /// The comparison of the belts of two drives; `None` for a machine with one drive, or if no free parameter changes
     /// them.
     pub fn belts(&self) -> Option<&Belts> {
-        self.identifiability.as_ref().and_then(|found| found.belts.as_ref())
+        self.identifiability.as_ref().and_then(|found| found.belts.as_ref()).map(|compared| &compared.belts)
     }
 
     /// The combinations of undetermined parameters that are determined.

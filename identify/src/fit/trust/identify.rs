@@ -6,7 +6,7 @@
 //! [`UNDETERMINED`], or if the outputs change by less than a machine can show ([`LEAST_SHOWN`], [`MODEL_ERROR`]), it is
 //! not determined.
 
-use super::belts::Belts;
+use super::belts::Compared;
 use super::combinations::{self, Combination};
 use super::directions::Directions;
 use crate::fit::asked::problem::{Problem, extent};
@@ -32,7 +32,7 @@ pub struct Identifiability {
     /// runs.
     pub lost: DMatrix<f64>,
     /// Comparison of the belts of two drives, if a free parameter changes them.
-    pub belts: Option<Belts>,
+    pub belts: Option<Compared>,
 }
 
 /// Parameters that the logs cannot distinguish.
@@ -94,7 +94,7 @@ impl Identifiability {
             .collect();
         let singular = singular.iter().map(|s| s / deviation).collect();
         let hidden = v.select_columns(&lost);
-        let belts = Belts::compared(problem, directions, &lost, x, of);
+        let belts = Compared::of(problem, directions, &lost, x, of);
         let mut result = Self { names, sensitivity, singular, error, groups: Vec::new(), lost: hidden, belts };
         result.groups = result.grouped(problem, directions, (&lost, off), x, of);
         result
