@@ -149,7 +149,8 @@ fn of_gantry(gantry: &Machine) -> Vec<Panel> {
     for label in gantry.geometry().bodies.iter().map(|body| body.label) {
         state = state.column(&format!("{}_state", label.key), label.name);
     }
-    vec![
+    let yaw = panel("yaw", "Yaw", "Yaw of the bridge; positive if its right end leads", ("µrad", 1e6));
+    let mut panels = vec![
         panel("position", "Position", "Where bridge and cart are", MM)
             .column("bridge_position", "bridge x")
             .column("cart_position", "cart y"),
@@ -159,12 +160,15 @@ fn of_gantry(gantry: &Machine) -> Vec<Panel> {
         panel("error", "Place minus drives", "How far bridge and cart are from where the drives say", UM)
             .curve("x_error", "bridge", &error(0, "bridge_position"))
             .curve("y_error", "cart", &error(1, "cart_position")),
+        yaw.column("yaw_angle", "yaw ψ"),
         force,
         of_drives(panel("voltage", "Voltage", "Voltage at each motor", ("V", 1.0)), &|drive| drive.voltage.key),
         of_drives(panel("current", "Current", "Current of each motor", ("A", 1.0)), &|drive| drive.current_column),
         state,
         drawing.curve("bridge_by_drives", "", &by_drives(0)).curve("cart_by_drives", "", &by_drives(1)),
-    ]
+    ];
+    panels.retain(|panel| panel.key != "yaw" || gantry.yaw.is_some());
+    panels
 }
 
 /// The panels as the page gets them.

@@ -10,7 +10,7 @@ mod meter;
 mod rotor;
 mod steady;
 
-pub use figures::{FIGURES, Figure, FigureRow, Role, Seek, Worth, figures};
+pub use figures::{Extras, FIGURES, Figure, FigureRow, Only, Role, Seek, Worth, figures};
 pub use meter::{Meter, Sought};
 pub use steady::{Balance, Held, SteadySpeed, balanced_speed};
 

@@ -491,7 +491,7 @@ await test("gallery, tour and frequencies lead where they say", async open => {
   await page.click("#go-gallery");
   await page.waitForSelector(".gallery li");
   const count = await page.locator(".gallery li").count();
-  expect(count === 17, `${count} machines`);
+  expect(count === 18, `${count} machines`);
   await page.screenshot({path: join(shots, "studio-gallery.png")});
   await page.locator(".gallery button", {hasText: "core-xy/core-xy.toml"}).click();
   await quiet(page);

@@ -6,7 +6,7 @@ use crate::fit::LogFit;
 use crate::machine::{AmplifierMode, Kind, Machine, Motor, axis};
 use crate::mechanism::{Mechanism, STEPPERS};
 use crate::metrics::{
-    self, EventCount, Figure, Metrics, OfDrive, OfLoad, OfSpan, Peak, Role, Seek, SteadySpeed, Worth,
+    self, EventCount, Extras, Figure, Metrics, OfDrive, OfLoad, OfSpan, Peak, Role, Seek, SteadySpeed, Worth,
 };
 use crate::reduction::Reduction;
 use crate::solve::{self, ErrorEstimate, Method, Outcome, Solver};
@@ -368,7 +368,7 @@ pub fn figures(metrics: &Metrics, machine: &Machine) -> Value {
     let geometry = machine.geometry();
     let mut told = Map::new();
     told.insert("end_time_s".into(), json!(metrics.end));
-    for figure in metrics::figures(machine.kind, machine.stepper().is_some()) {
+    for figure in metrics::figures(machine.kind, Extras::of(machine)) {
         let value = match figure.of(metrics) {
             Worth::Number(_) if figure.row.seek == Some(Seek::SteadySpeed) => {
                 let steady =
@@ -392,10 +392,6 @@ pub fn figures(metrics: &Metrics, machine: &Machine) -> Value {
         }
     }
     let counts = geometry.bodies.iter().zip(&metrics.bodies).map(|(body, count)| CountTold::of(body.label.key, *count));
-    if let Some(yaw) = metrics.yaw {
-        told.insert("final_yaw_rad".into(), json!(yaw.angle));
-        told.insert("peak_yaw_rad".into(), super::peak(yaw.peak));
-    }
     told.insert("event_counts".into(), json!(counts.collect::<Vec<_>>()));
     Value::Object(told)
 }
@@ -436,9 +432,12 @@ pub(super) fn figure_lines() -> Vec<[String; 3]> {
             lines.push([path, kind.into(), words.into()]);
         }
     };
-    let with_steppers = Kind::ALL.into_iter().filter(|kind| kind.geometry().drives.len() <= STEPPERS);
-    let machines: Vec<(Kind, bool)> =
-        Kind::ALL.into_iter().map(|kind| (kind, false)).chain(with_steppers.map(|kind| (kind, true))).collect();
+    let machine = |kind: Kind| {
+        let drives = kind.geometry().drives.len();
+        let extras = Extras { stepper: drives <= STEPPERS, yaw: drives > 1 };
+        [(kind, Extras::default()), (kind, extras)]
+    };
+    let machines: Vec<(Kind, Extras)> = Kind::ALL.into_iter().flat_map(machine).collect();
     // Of more parts than any machine has.
     let nothing = Metrics {
         loads: vec![OfLoad::default(); 8],
@@ -447,9 +446,9 @@ pub(super) fn figure_lines() -> Vec<[String; 3]> {
         bodies: vec![EventCount::default(); 8],
         ..Metrics::default()
     };
-    for figure in machines.iter().flat_map(|&(kind, steps)| metrics::figures(kind, steps)) {
-        let has = |(kind, steps): &(Kind, bool), name: &str| {
-            metrics::figures(*kind, *steps).iter().any(|one| one.by_role == name || one.name == name)
+    for figure in machines.iter().flat_map(|&(kind, extras)| metrics::figures(kind, extras)) {
+        let has = |(kind, extras): &(Kind, Extras), name: &str| {
+            metrics::figures(*kind, *extras).iter().any(|one| one.by_role == name || one.name == name)
         };
         let of_all = |name: &str| machines.iter().all(|machine| has(machine, name));
         let ends: &[(&str, &str)] = match figure.of(&nothing) {

@@ -7,7 +7,7 @@ use crate::control::{self, MoveRun, Setup};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
-use crate::metrics::{self, Held, Meter, Sought};
+use crate::metrics::{self, Extras, Held, Meter, Sought};
 use crate::solve::{self, Bench, Flow, Job, Outcome, Solver};
 use crate::trajectory::Trajectory;
 use std::ops::Range;
@@ -37,7 +37,7 @@ impl Subject {
             experiment.every = plan.interval.unwrap_or(experiment.every);
         }
         let (machine, moves, controller) = (case.machine.clone(), case.moves.clone(), case.controller.clone());
-        let mut of_experiment = metrics::figures(machine.kind, machine.stepper().is_some());
+        let mut of_experiment = metrics::figures(machine.kind, Extras::of(&machine));
         of_experiment.retain(|figure| !(case.is_axis() && figure.row.again_on_an_axis) && plan.tells(&figure.name));
         let mut of_move = measures::of_move(machine.kind);
         of_move.retain(|measure| plan.tells(&measure.name));

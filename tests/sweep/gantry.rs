@@ -3,7 +3,7 @@
 use super::{bits, rows};
 use taut::case::{Case, Given, Sampling};
 use taut::machine::Kind;
-use taut::metrics::{Meter, Metrics, figures};
+use taut::metrics::{Extras, Meter, Metrics, figures};
 use taut::parameter::{Free, every, values};
 use taut::solve::{Course, Detail, Flow, Solver, stream_mechanism};
 use taut::sweep::{Status, Sweep};
@@ -12,6 +12,7 @@ use taut::trajectory::Trajectory;
 const H_FRAME: &str = include_str!("../../stages/h-frame/h-frame.toml");
 const CORE_XY: &str = include_str!("../../stages/core-xy/core-xy.toml");
 const DUAL_BELT: &str = include_str!("../../stages/dual-belt/dual-belt.toml");
+const RACKING: &str = include_str!("../../stages/h-frame/racking.toml");
 
 fn case(text: &str, changes: &[&str]) -> Case {
     Case::from_text_with("gantry.toml", text, changes).unwrap_or_else(|error| panic!("{error}"))
@@ -58,7 +59,7 @@ fn a_row_is_the_run_of_its_machine() {
         "motor.torque_constant",
     ];
     let mut compared = 0;
-    for text in [H_FRAME, CORE_XY, DUAL_BELT] {
+    for text in [H_FRAME, CORE_XY, DUAL_BELT, RACKING] {
         for design in ["random", "latin-hypercube", "sobol"] {
             let mut changes =
                 vec![format!("sweep.design={design}"), "sweep.runs=6".to_string(), "sweep.solver=exact".to_string()];
@@ -74,7 +75,7 @@ fn a_row_is_the_run_of_its_machine() {
                 for (number, group) in sweep.groups().iter().enumerate() {
                     assert_eq!(table.get(&format!("{}.status", group.file)).unwrap()[row], Status::Complete.code());
                     let metrics = simulated(&case, number);
-                    for figure in figures(case.machine.kind, false) {
+                    for figure in figures(case.machine.kind, Extras::of(&case.machine)) {
                         let value = table.get(&format!("{}.{}", group.file, figure.name)).unwrap()[row];
                         let told = figure.of(&metrics).number();
                         assert_eq!(value.to_bits(), told.to_bits(), "{design} {}", figure.name);

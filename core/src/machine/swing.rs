@@ -7,8 +7,8 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// Eigenvalues up to this fraction of the largest count as zero.
 const NOTHING: f64 = 1e-9;
 
-/// Frequency of the slowest elastic mode on the spans of the belt and the bearings of the bridge, rad/s, at the origin and without damping; rotors
-/// turn with their pulleys. None for a machine whose belt does not stretch.
+/// Frequency of the slowest elastic mode on the spans of the belt and the bearings of the bridge, rad/s, at the origin
+/// and without damping; rotors turn with their pulleys. None for a machine whose belt does not stretch.
 ///
 /// M q̈ + K q = 0 with K = Σ k a aᵀ over the spans: the least eigenvalue of M^(−½) K M^(−½) above zero is ω₀².
 pub fn slowest_swing(mechanism: &Mechanism) -> Option<f64> {

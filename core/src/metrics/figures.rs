@@ -2,7 +2,7 @@
 //! the studio are made from it: a new figure is one row here.
 
 use super::{Metrics, Peak};
-use crate::machine::{DriveAt, Geometry, Kind};
+use crate::machine::{DriveAt, Geometry, Kind, Machine};
 use crate::mechanism::Label;
 
 /// The role of a part of a machine.
@@ -68,13 +68,15 @@ pub enum Seek {
     Force,
     /// The steady speed.
     SteadySpeed,
+    /// The peak yaw of a bridge.
+    Yaw,
     /// When everything came to rest.
     StopTime,
 }
 
 impl Seek {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::LoadSpeed,
         Self::LoadError,
         Self::BeltSpeed,
@@ -83,8 +85,36 @@ impl Seek {
         Self::Stretch,
         Self::Force,
         Self::SteadySpeed,
+        Self::Yaw,
         Self::StopTime,
     ];
+}
+
+/// The machines that have a figure, if not all have it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Only {
+    /// Those with a single drive.
+    OneDrive,
+    /// Those with steppers.
+    Steppers,
+    /// Those whose bridge yaws.
+    Yaw,
+}
+
+/// What a machine may have beside the parts of its kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Extras {
+    /// Steppers.
+    pub stepper: bool,
+    /// A bridge that yaws.
+    pub yaw: bool,
+}
+
+impl Extras {
+    /// Those of a machine.
+    pub fn of(machine: &Machine) -> Self {
+        Self { stepper: machine.stepper().is_some(), yaw: machine.yaw.is_some() }
+    }
 }
 
 /// A row of the list: a figure of each part of a role.
@@ -102,10 +132,8 @@ pub struct FigureRow {
     pub of_axis: Option<[&'static str; 2]>,
     /// True if it repeats another figure on an axis, so that sweeps of axes omit it.
     pub again_on_an_axis: bool,
-    /// True if it exists for machines with one drive only.
-    pub one_drive: bool,
-    /// True if it exists for machines with steppers only.
-    pub stepper: bool,
+    /// The machines that have it, if not all.
+    pub only: Option<Only>,
     /// Its value for the part with this index.
     pub of: fn(&Metrics, usize) -> Worth,
     /// Quantity that a meter follows for it; for a figure of the whole machine, of all parts.
@@ -115,8 +143,7 @@ pub struct FigureRow {
 type Of = fn(&Metrics, usize) -> Worth;
 
 const fn row(role: Role, name: &'static str, unit: &'static str, words: &'static str, of: Of) -> FigureRow {
-    let (again_on_an_axis, one_drive, stepper) = (false, false, false);
-    FigureRow { role, name, unit, words, of_axis: None, again_on_an_axis, one_drive, stepper, of, seek: None }
+    FigureRow { role, name, unit, words, of_axis: None, again_on_an_axis: false, only: None, of, seek: None }
 }
 
 impl FigureRow {
@@ -132,12 +159,8 @@ impl FigureRow {
         Self { again_on_an_axis: true, ..self }
     }
 
-    const fn of_one_drive(self) -> Self {
-        Self { one_drive: true, ..self }
-    }
-
-    const fn of_steppers(self) -> Self {
-        Self { stepper: true, ..self }
+    const fn only(self, only: Only) -> Self {
+        Self { only: Some(only), ..self }
     }
 }
 
@@ -159,20 +182,22 @@ pub static FIGURES: &[FigureRow] = &[
     row(Load, "peak_drives_minus_*", "m", "largest drives minus *", |m, k| Worth::Peak(m.loads[k].peak_error)).seeking(Seek::LoadError)
         .on_an_axis("peak_drive_travel_minus_cart", "largest drive travel minus cart").again(),
     row(Pulley, "peak_*_speed", "m/s", "peak speed r φ′ of the *", |m, k| Worth::Peak(m.drives[k].peak_belt_speed.unwrap_or_default()))
-        .seeking(Seek::BeltSpeed).of_one_drive().on_an_axis("peak_drive_speed", "peak drive speed r φ₁′"),
+        .seeking(Seek::BeltSpeed).only(Only::OneDrive).on_an_axis("peak_drive_speed", "peak drive speed r φ₁′"),
     row(Shaft, "peak_*_speed", "rad/s", "peak speed of the *", |m, k| Worth::Peak(m.drives[k].peak_speed)).seeking(Seek::ShaftSpeed).again(),
     row(Whole, "steady_speed", "m/s", "steady cart speed", |m, _| Number(m.steady_speed.map_or(f64::NAN, |steady| steady.value)))
-        .seeking(Seek::SteadySpeed).of_one_drive(),
+        .seeking(Seek::SteadySpeed).only(Only::OneDrive),
     row(Span, "peak_*_stretch", "m", "peak stretch of *", |m, k| Worth::Peak(m.spans[k].peak_stretch)).seeking(Seek::Stretch),
     row(Span, "peak_*_force", "N", "peak force in *", |m, k| Worth::Peak(m.spans[k].peak_force)).seeking(Seek::Force),
     row(Whole, "peak_belt_force", "N", "largest force in the belt", |m, _| Worth::Peak(m.largest_force().1)).seeking(Seek::Force),
     row(Motor, "peak_*_current", "A", "peak current of the *", |m, k| Worth::Peak(m.drives[k].peak_current)).seeking(Seek::Current)
         .on_an_axis("peak_motor_current", "peak motor current"),
     row(Motor, "*_lost_steps", "", "full steps lost by the * at the end", |m, k| Number(m.drives[k].lost_steps.map_or(f64::NAN, |own| own.at_end as f64)))
-        .of_steppers().on_an_axis("lost_steps", "full steps lost at the end"),
-    row(Whole, "in_step", "", "in step all the way", |m, _| Flag(m.in_step())).of_steppers(),
+        .only(Only::Steppers).on_an_axis("lost_steps", "full steps lost at the end"),
+    row(Whole, "in_step", "", "in step all the way", |m, _| Flag(m.in_step())).only(Only::Steppers),
     row(Load, "*_position_error", "m", "commanded minus * position at the end", |m, k| Number(m.loads[k].command_error.unwrap_or(f64::NAN)))
-        .of_steppers().on_an_axis("position_error", "commanded minus cart position at the end"),
+        .only(Only::Steppers).on_an_axis("position_error", "commanded minus cart position at the end"),
+    row(Whole, "final_yaw", "rad", "yaw of the bridge at the end", |m, _| Number(m.yaw.unwrap_or_default().angle)).only(Only::Yaw),
+    row(Whole, "peak_yaw", "rad", "largest yaw of the bridge", |m, _| Worth::Peak(m.yaw.unwrap_or_default().peak)).seeking(Seek::Yaw).only(Only::Yaw),
     row(Whole, "stop_time", "s", "time of the last stop", |m, _| Number(m.stop_time.unwrap_or(f64::NAN))).seeking(Seek::StopTime),
     row(Whole, "settled", "", "at rest at the end", |m, _| Flag(m.settled)),
     row(Body, "*_stops", "", "stops of the *", |m, k| Number(m.bodies[k].stops as f64)),
@@ -237,10 +262,15 @@ fn parts(geometry: &Geometry, role: Role) -> Vec<(&'static str, String)> {
     labels.into_iter().map(|label| (label.key, named(label.name))).collect()
 }
 
-/// The key figures of a kind of machine, with steppers or without, in the order of the list, then of the parts.
-pub fn figures(kind: Kind, has_stepper: bool) -> Vec<Figure> {
+/// The key figures of a kind of machine with these extras, in the order of the list, then of the parts.
+pub fn figures(kind: Kind, extras: Extras) -> Vec<Figure> {
     let geometry = kind.geometry();
-    let has = move |row: &&FigureRow| (!row.one_drive || geometry.drives.len() == 1) && (!row.stepper || has_stepper);
+    let has = move |row: &&FigureRow| match row.only {
+        None => true,
+        Some(Only::OneDrive) => geometry.drives.len() == 1,
+        Some(Only::Steppers) => extras.stepper,
+        Some(Only::Yaw) => extras.yaw,
+    };
     let rows = FIGURES.iter().filter(has);
     let of_parts = |row: &'static FigureRow| {
         parts(geometry, row.role).into_iter().enumerate().map(move |(place, (part, name))| {
@@ -268,7 +298,8 @@ mod tests {
     #[test]
     fn no_two_figures_of_a_kind_share_a_name() {
         for kind in Kind::ALL {
-            let mut names: Vec<String> = figures(kind, true).into_iter().map(|figure| figure.name).collect();
+            let mut names: Vec<String> =
+                figures(kind, Extras { stepper: true, yaw: true }).into_iter().map(|figure| figure.name).collect();
             let count = names.len();
             names.sort();
             names.dedup();

@@ -37,8 +37,9 @@ struct Places {
     belt_speeds: Vec<Place>,
     shaft_speeds: Vec<Place>,
     currents: Vec<Place>,
-    /// Of the spans, then the yaw of a bridge that yaws.
     stretches: Vec<Place>,
+    /// Of a bridge that yaws.
+    yaw: Option<Place>,
     forces: Vec<Place>,
     sums: Vec<Sum>,
     /// Independent rotors, and the readings of their speeds.
@@ -70,8 +71,8 @@ impl Places {
             read @ Place::Reading(..) => read,
             Place::Sum(_) => summed(geometry.spans[span].by_others, geometry.spans[span].on_yaw),
         });
-        let mut stretches: Vec<Place> = stretches.collect();
-        stretches.extend(yaw.map(|(reading, _)| Place::Reading(reading, 1.0)));
+        let stretches = stretches.collect();
+        let yaw = yaw.map(|(reading, _)| Place::Reading(reading, 1.0));
         let belt_speeds: Vec<Place> = match &mechanism.drives[..] {
             [drive] => vec![place(Shown::Speed(drive.pulley, machine.pulley_radius))],
             _ => Vec::new(),
@@ -94,6 +95,7 @@ impl Places {
             shaft_speeds,
             currents: (0..mechanism.drives.len()).map(|drive| place(Shown::Current(drive))).collect(),
             stretches,
+            yaw,
             forces: (0..geometry.spans.len())
                 .map(|span| place(Shown::Force(machine.span_alike(span).unwrap_or(span), 1.0)))
                 .collect(),
@@ -112,6 +114,7 @@ impl Places {
             Seek::ShaftSpeed => &self.shaft_speeds,
             Seek::Current => &self.currents,
             Seek::Stretch => &self.stretches,
+            Seek::Yaw => self.yaw.as_slice(),
             Seek::Force => &self.forces,
             Seek::SteadySpeed | Seek::StopTime => &[],
         }
@@ -331,10 +334,7 @@ impl Meter {
             loads: geometry.slides.iter().zip(machine.by_drives(&state.position)).enumerate().map(load).collect(),
             drives: geometry.drives.iter().enumerate().map(drive).collect(),
             spans: (0..geometry.spans.len()).map(span).collect(),
-            yaw: machine.yaw_body().map(|body| OfYaw {
-                angle: state.position[body],
-                peak: peak(places.stretches.get(geometry.spans.len())),
-            }),
+            yaw: machine.yaw_body().map(|body| OfYaw { angle: state.position[body], peak: peak(places.yaw.as_ref()) }),
             bodies: counts,
             steady_speed: self.plateau.as_ref().and_then(|plateau| plateau.steady_speed(machine)),
             stop_time: last.map(|time| time.max(turned)).filter(|_| settled),

@@ -59,13 +59,16 @@ pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
         Axis::new("Position", "m").shown_as("mm", 1e3),
         &[("bridge_position", "bridge x"), ("cart_position", "cart y")],
     );
-    let positions = figure("positions")
+    let mut positions = figure("positions")
         .panel(marked(position, ["bridge_position", "cart_position"]).weight(1.6))
         .panel(panel(Axis::new("Drives − true", "m").shown_as("µm", 1e6), &[("x error", "x"), ("y error", "y")]))
         .caption(
             "Where bridge and cart are, and by how much the drives miss them: x and y as the angles of the pulleys say, with belts that \
              do not stretch, minus what they are. Where bridge and cart stick and slip is marked.",
         );
+    if gantry.yaw.is_some() {
+        positions = positions.panel(panel(Axis::new("Yaw", "rad").shown_as("µrad", 1e6), &[("yaw_angle", "bridge ψ")]));
+    }
     let speed = panel(
         Axis::new("Speed", "m/s").shown_as("mm/s", 1e3),
         &[("bridge_speed", "bridge ẋ"), ("cart_speed", "cart ẏ")],

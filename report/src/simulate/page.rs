@@ -91,7 +91,7 @@ fn experiment(
 fn all_figures(page: &mut Page, run: &Run, machine: &Machine) {
     page.subsection("Key figures");
     let mut table = Table::new("").column("Figure", "").column("Value", "").column("At", "s");
-    for figure in metrics::figures(machine.kind, machine.stepper().is_some()) {
+    for figure in metrics::figures(machine.kind, metrics::Extras::of(machine)) {
         let unit = figure.unit;
         let (value, at) = match figure.of(&run.metrics) {
             Worth::TimeOfPeak(_) => continue,
