@@ -278,9 +278,10 @@ struct Counts {
 
 impl Counts {
     /// Adds what a line such as `test result: ok. 5 passed; 0 failed; …`, or pytest's `5 passed, 1 skipped in 0.1s`,
-    /// reports.
+    /// reports; pytest adds `(0:01:15)` after more than a minute.
     fn take(&mut self, line: &str) {
-        let pytest = line.ends_with('s') && line.contains(" in ") && line.starts_with(|c: char| c.is_ascii_digit());
+        let seconds = line.split(" (").next().unwrap_or(line);
+        let pytest = seconds.ends_with('s') && line.contains(" in ") && line.starts_with(|c: char| c.is_ascii_digit());
         if !line.starts_with("test result: ") && !pytest {
             return;
         }
@@ -317,6 +318,7 @@ mod tests {
         counts.take("test result: FAILED. 3 passed; 2 failed; 0 ignored; 0 measured; 0 filtered out");
         counts.take("test the_word_passed; ... ok");
         counts.take("1 failed, 38 passed, 1 skipped in 4.56s");
-        assert_eq!(counts, Counts { passed: 53, failed: 3, ignored: 2, left_out: Vec::new() });
+        counts.take("189 passed, 1 warning in 130.29s (0:02:10)");
+        assert_eq!(counts, Counts { passed: 242, failed: 3, ignored: 2, left_out: Vec::new() });
     }
 }

@@ -47,7 +47,8 @@ class Shape:
     def belts(self) -> dict[str, Any] | None:
         """Which belt is ``looser``, the ``stiffness_ratio`` (belt B to belt A) with its ``interval_95``, and ``words``;
         ``None`` unless ``belts=True`` was said."""
-        return self.data["belts"]
+        belts: dict[str, Any] | None = self.data["belts"]
+        return belts
 
     @property
     def pair_line(self) -> str | None:
