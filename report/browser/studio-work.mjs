@@ -365,15 +365,15 @@ await test("a spectrum is dropped, and shapers stand over it", async open => {
 await test("a sweep fills its figures while it runs, and what is brushed shows its trajectories", async open => {
   const {page} = await open((await harness.serve([TABLE4])).address);
   await go(page, "sweep");
-  await page.locator("#runs").fill("600");
+  await page.locator("#runs").fill("3000");
   const counts = page.evaluate(
     () =>
       new Promise(done => {
         const seen = new Set(),
           watch = setInterval(() => {
             const told = document.querySelector("#sweep-status").textContent;
-            if (/ of 600 runs/.test(told)) seen.add(told);
-            if (/^600 runs in/.test(told)) {
+            if (/ of 3000 runs/.test(told)) seen.add(told);
+            if (/^3000 runs in/.test(told)) {
               clearInterval(watch);
               done(seen.size);
             }
@@ -381,13 +381,12 @@ await test("a sweep fills its figures while it runs, and what is brushed shows i
       }),
   );
   await page.click("#sweep");
-  await page.waitForFunction(() => /^600 runs in/.test(document.querySelector("#sweep-status").textContent), null, {
-    timeout: 120_000,
-  });
+  const isDone = () => /^3000 runs in/.test(document.querySelector("#sweep-status").textContent);
+  await page.waitForFunction(isDone, null, {timeout: 120_000});
   expect((await counts) >= 2, `${await counts} steps of progress were seen`);
   await quiet(page);
   const whole = await page.locator("#chosen").innerText();
-  expect(/600 runs, none chosen/.test(whole), whole);
+  expect(/3000 runs, none chosen/.test(whole), whole);
   const area = page.locator("[data-picture=Histogram] .area");
   await area.scrollIntoViewIfNeeded();
   const box = await area.boundingBox();
@@ -396,8 +395,8 @@ await test("a sweep fills its figures while it runs, and what is brushed shows i
   await page.mouse.move(box.x + 0.45 * box.width, box.y + 100, {steps: 5});
   await page.mouse.up();
   await quiet(page);
-  const chosen = Number(/^(\d+) of 600/.exec(await page.locator("#chosen").innerText())[1]);
-  expect(chosen > 0 && chosen < 600, `${chosen} chosen`);
+  const chosen = Number(/^(\d+) of 3000/.exec(await page.locator("#chosen").innerText())[1]);
+  expect(chosen > 0 && chosen < 3000, `${chosen} chosen`);
   const own = await page.evaluate(() => document.querySelectorAll("#view-sweep .card tbody tr").length);
   expect(own === Math.min(100, chosen), `${own} rows are listed`);
   await shot(page, "sweep");
@@ -408,7 +407,7 @@ await test("a sweep fills its figures while it runs, and what is brushed shows i
   await area.focus();
   for (let k = 0; k < 10; k++) await page.keyboard.press("Shift+ArrowRight");
   await quiet(page);
-  expect(/^\d+ of 600 runs chosen/.test(await page.locator("#chosen").innerText()), "keys choose nothing");
+  expect(/^\d+ of 3000 runs chosen/.test(await page.locator("#chosen").innerText()), "keys choose nothing");
 });
 
 await test("a sweep is stopped, and keeps what is done", async open => {

@@ -330,6 +330,8 @@ export class Row {
     this.grip = 0;
     /** What holds the thumb: meanwhile neither it nor the range moves by itself. @type {"" | "pointer" | "key"} */
     this.held = "";
+    /** It was left at an end whose value is still awaited. */
+    this.isLeft = false;
     this.slider = element("input", {
       type: "range",
       min: 0,
@@ -500,12 +502,16 @@ export class Row {
   /** A slider that is left at one of its ends reaches further when it is used again. */
   leave() {
     this.release();
-    if ((this.at > 0.02 * STEPS && this.at < 0.98 * STEPS) || this.app.pending.has(this.parameter.key)) return;
+    if (this.at > 0.02 * STEPS && this.at < 0.98 * STEPS) return;
+    // Not before the value is there that it was left at.
+    this.isLeft = this.app.pending.has(this.parameter.key);
+    if (this.isLeft) return;
     this.span();
     this.place(this.parameter.value);
   }
 
   moved() {
+    this.isLeft = false;
     const at = Math.max(0, Math.min(STEPS, Math.round(Number(this.slider.value) + this.grip))),
       share = at / STEPS;
     if (at === this.at) {
@@ -565,7 +571,8 @@ export class Row {
       return;
     }
     if (this.reset.disabled !== (value === this.home)) this.reset.disabled = value === this.home;
-    if (!this.held && this.range !== ranges.get(key)) {
+    if (!this.held && (this.isLeft || this.range !== ranges.get(key))) {
+      this.isLeft = false;
       this.span();
       this.shown = NaN;
     }
