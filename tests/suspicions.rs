@@ -156,6 +156,29 @@ fn jumps_are_found_beside_narrow_band_noise() {
     }
 }
 
+/// Of positions without their sign a fit knew nothing but that it explained little.
+#[test]
+fn a_magnitude_is_named() {
+    let mut magnitudes = 0;
+    for seed in 1..=10 {
+        let case = drawn(700 + seed, 0.0, 0);
+        let mut bad = case.clone();
+        let values = &mut Arc::make_mut(bad.experiments[0].log.as_mut().unwrap()).outputs[0].values;
+        // It passes zero at a speed, by far more than the noise between samples.
+        let is_fast = |pair: &[f64]| pair[0] * pair[1] <= 0.0 && (pair[1] - pair[0]).abs() > 1e-4;
+        let passes = values.windows(2).filter(|pair| is_fast(pair)).count();
+        values.iter_mut().for_each(|value| *value = value.abs());
+        assert!(!warned(&fitted(&case), "magnitude"), "{seed}");
+        if passes > 0 {
+            magnitudes += 1;
+            let found = fitted(&bad);
+            let told: Vec<String> = found.warnings().map(ToString::to_string).collect();
+            assert!(told.iter().any(|one| one.contains("absolute = [\"cart_position\"]")), "{seed}: {told:?}");
+        }
+    }
+    assert!(magnitudes >= 5, "{magnitudes}");
+}
+
 /// A time as findings write it.
 fn shown(time: f64) -> String {
     taut::number::engineering_typed(time, "s", 4)

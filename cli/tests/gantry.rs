@@ -455,3 +455,21 @@ fn init_writes_gantries_that_run_as_they_stand() {
         assert!(text(&output.stdout).contains("following bridge and cart"), "{}\n{shown}", text(&output.stderr));
     }
 }
+
+/// Bearings given in N/m for N/mm let a bridge yaw by 54°, of which the accuracy of the run said nothing.
+#[test]
+fn a_bridge_that_yaws_beyond_its_model_is_warned_of() {
+    let folder = TempDir::new().unwrap();
+    let run = |more: &[&str]| {
+        let mut run = taut_in(folder.path());
+        run.arg("simulate").arg(stage("h-frame/racking.toml")).args(["--experiment", "along y"]).args(more);
+        let output = run.output().unwrap();
+        (output.status.code(), text(&output.stderr).to_string())
+    };
+    assert_eq!(run(&[]).0, Some(0));
+    let soft = ["--set", "bridge.yaw.bearing_stiffness=10 N/m", "--set", "bridge.yaw.bearing_damping=0"];
+    let (status, told) = run(&soft);
+    assert_eq!(status, Some(1));
+    let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(told.contains("its equations are for less than 100 mrad"), "{told}");
+}

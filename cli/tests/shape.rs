@@ -142,6 +142,10 @@ fn the_looser_of_two_belts() {
     assert!(words.starts_with("belt B is looser than belt A: ") && report.contains(words), "{words}");
     // Without the option nothing is stated.
     assert!(json(&[a, b])["belts"].is_null());
+    // One spectrum given twice has no second belt.
+    let twice = taut_in(root()).args(["shape", "--belts", a, a]).output().unwrap();
+    let told = String::from_utf8_lossy(&twice.stderr);
+    assert!(twice.status.code() == Some(2) && told.contains("the same values as in"), "{told}");
 }
 
 #[test]

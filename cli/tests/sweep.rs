@@ -225,6 +225,8 @@ fn mistakes_on_the_command_line_are_told() {
         (vec!["--runs", "10", "--vary", "all=20%", "--trajectories"], "--out"),
         (vec!["--runs", "10", "--vary", "all=20%", "--threads", "0"], "a whole number from 1"),
         (vec!["--runs", "10", "--vary", "cart.mass=20%", "--vary", "total.inertia=20%"], "set the same number"),
+        (vec!["--runs", "10", "--vary", "cart.mass=20%", "--vary", "cart.mass=10%"], "cart.mass varies twice"),
+        (vec!["--runs", "10", "--vary", "all=20%", "--seed=-1"], "a whole number from 0 to 9223372036854775807"),
         (
             vec!["--indices", "--design", "grid", "--vary", "cart.mass=values(1 kg)"],
             "sensitivity indices are not available",

@@ -126,6 +126,11 @@ impl Metrics {
         self.drives.first().copied().unwrap_or_default()
     }
 
+    /// True if neither loads nor shafts move at the end.
+    pub fn is_still(&self) -> bool {
+        self.loads.iter().all(|load| load.speed == 0.0) && self.drives.iter().all(|drive| drive.shaft_speed == 0.0)
+    }
+
     /// True if no stepper lost a step.
     pub fn in_step(&self) -> bool {
         self.drives.iter().all(|drive| drive.lost_steps.is_none_or(|lost| lost.slips == 0))

@@ -36,6 +36,9 @@ const MACHINES: &[(&str, usize, &[&str])] = &[
     (TABLE4, 24, &["sweep.vary.all=20 %", "cart.force_by_speed=[[\"-0.5 m/s\", \"2 N\"], [\"0 m/s\", \"0 N\"], [\"0.1 m/s\", \"-1 N\"]]"]),
     (TABLE4, 24, &["sweep.vary.all=20 %", "belt.pretension=3 N", "motor.inductance=0.5 mH", "amplifier.current_limit=4 A", "travel={ min = \"-1 mm\", max = \"60 mm\", stop_stiffness = \"40 kN/m\" }"]),
     (TABLE4, 12, &["sweep.vary.all=20 %", "belt.model=\"two-mass\"", "belt.pretension=3 N", "travel={ min = \"-1 mm\", max = \"60 mm\", stop_stiffness = \"40 kN/m\" }"]),
+    // Inputs that change at the end of a run.
+    (TABLE4, 24, &["sweep.vary.all=20 %", "experiment.0.until=0.5 s", "experiment.0.input={ sum = [{ pulse = \"5 V\", for = \"0.1 s\" }, { step = \"12 V\", at = \"0.5 s\" }] }"]),
+    (DUAL_BELT, 8, &["sweep.vary.\"cart.mass\"=20 %", "experiment.0.until=0.3 s", "experiment.0.input={ left = { square = \"5 V\", frequency = \"5 Hz\" }, cart = { square = \"3 V\", frequency = \"10 Hz\" } }"]),
     (H_FRAME, 8, &["sweep.vary.\"cart.mass\"=20 %", "sweep.vary.\"belt.stiffness\"=20 %"]),
     (CORE_XY, 8, &["sweep.vary.\"cart.mass\"=20 %", "sweep.vary.\"motor.resistance\"=20 %"]),
     (H_FRAME, 8, &["sweep.vary.\"cart.mass\"=20 %", "belt.pretension=4 N", "bridge.travel={ min = \"-20 mm\", max = \"20 mm\", stop_stiffness = \"20 kN/m\" }"]),

@@ -404,6 +404,14 @@ impl Columns<'_> {
             };
             return Err(self.sheet.error(0, row, what).allowed("times that increase from row to row").next(next));
         }
+        if let Some((row, factor)) = other_unit(&time[rows.clone()]) {
+            let row = rows.start + row;
+            let (here, there, name) = (self.sheet.row(row), self.sheet.row(row - 1), &self.sheet.names[0]);
+            let [before, t] = [time[row - 1], time[row]].map(|t| show(t, "s"));
+            let what = format!("the clock {name} has another unit from {here} on: {t} after {before} in {there}");
+            let error = self.sheet.error(0, row, what).allowed("one unit of time in all rows");
+            return Err(error.next(format!("divide the times from there on by {factor}")));
+        }
         Ok(time[rows].to_vec())
     }
 
@@ -534,4 +542,18 @@ impl Columns<'_> {
             false => before.last().copied().filter(|x| !x.is_nan()),
         }
     }
+}
+
+/// The row from which on times have another unit, and the factor: they go on by F h after F (t + h).
+fn other_unit(time: &[f64]) -> Option<(usize, f64)> {
+    let step = |row: usize| time[row] - time[row - 1];
+    let is_so = |row: usize, factor: f64| {
+        let (before, after) = (factor * step(row - 1), step(row + 1));
+        let due = factor * (time[row - 1] + step(row - 1));
+        (0.5..2.0).contains(&(after / before)) && (time[row] - due).abs() < 2.0 * before && time[row - 1] > 0.0
+    };
+    let rows = 2..time.len().saturating_sub(1);
+    // A step that is no longer than those before it is the common case.
+    let mut jumps = rows.filter(|&row| step(row) > 100.0 * step(row - 1));
+    jumps.find_map(|row| [1e3, 1e6, 1e9].into_iter().find(|&factor| is_so(row, factor)).map(|factor| (row, factor)))
 }

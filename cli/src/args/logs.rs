@@ -1,6 +1,6 @@
 //! Logs: `check`, `fit`, `frf`, and the experiment to make next, `design`.
 
-use super::values::{amperes, channel, count, count_or_none, delay, length, metres, seconds, share};
+use super::values::{amperes, channel, count, count_or_none, delay, length, metres, seconds, seed, share};
 use crate::command::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
@@ -162,7 +162,7 @@ pub struct Design {
     #[arg(long, value_name = "MACHINES", value_parser = count_or_none, default_value_t = VERIFIED)]
     pub verify: usize,
     /// Seed of the starting points of the search
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", value_parser = seed, default_value_t = 1)]
     pub seed: u64,
     #[command(flatten)]
     pub common: Common,

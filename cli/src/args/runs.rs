@@ -1,6 +1,6 @@
 //! Runs: `simulate`, `move`, `sweep`.
 
-use super::values::{count, share, step};
+use super::values::{count, seed, share, step};
 use crate::command::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
@@ -125,7 +125,7 @@ pub struct Sweep {
     #[arg(long, value_name = "DESIGN")]
     pub design: Option<String>,
     /// Seed of the random numbers, from 0 to 9223372036854775807 [default: 1]
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", value_parser = seed)]
     pub seed: Option<u64>,
     /// Also compute Sobol' indices: N (k + 2) runs for k parameters
     #[arg(long)]

@@ -19,6 +19,12 @@ pub fn metre_unit(text: &str) -> Result<f64, String> {
     quantity::read(&format!("1 {}", text.trim()), "m").map_err(|_| "a unit of length is needed, such as mm".into())
 }
 
+pub fn seed(text: &str) -> Result<u64, String> {
+    let most = i64::MAX as u64;
+    let seed = text.parse().ok().filter(|seed| *seed <= most);
+    seed.ok_or_else(|| format!("a whole number from 0 to {most} is needed"))
+}
+
 pub fn count_or_none(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(number @ 0..=1_000_000) => Ok(number),

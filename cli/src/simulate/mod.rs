@@ -18,9 +18,10 @@ use taut::case::{Case, Files};
 use taut::files::Claim;
 use taut::json::{self, Simulation};
 use taut::machine::Machine;
+use taut::metrics::Metrics;
 use taut::solve::{self, Ending, Solver};
 use taut::{Error, Result};
-use taut_report::simulate::{Run, early_end, hidden, report};
+use taut_report::simulate::{Run, early_end, hidden, report, yawed};
 
 /// How to keep the result.
 const ADVICE: &str = "add --out DIR for files and a report; `taut studio CASE` shows it in motion";
@@ -114,7 +115,12 @@ fn simulate(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     }
     let ended: Vec<Ended> = runs
         .iter()
-        .map(|run| Ended { name: &run.experiment.name, outcome: &run.outcome, early: early_end(run, &case.machine) })
+        .map(|run| Ended {
+            name: &run.experiment.name,
+            outcome: &run.outcome,
+            metrics: &run.metrics,
+            early: early_end(run, &case.machine),
+        })
         .collect();
     (finished.status, finished.remarks) = status(&ended, solver, &interrupt);
     finished.finish(common, folder)
@@ -189,14 +195,20 @@ fn measurable(case: &Case, solver: Solver, path: &Path) -> Result<()> {
 pub struct Ended<'a> {
     name: &'a str,
     outcome: &'a solve::Outcome,
+    metrics: &'a Metrics,
     /// Where it ended early: what is told of that.
     early: Option<String>,
+}
+
+/// Why a run is not to be relied on.
+fn unreliable(name: &str, outcome: &solve::Outcome, metrics: &Metrics) -> Option<String> {
+    hidden("run", name, outcome).or_else(|| yawed(name, metrics))
 }
 
 /// How it ended, and a word about every run that did not reach its end.
 fn status(runs: &[Ended], solver: Solver, interrupt: &Interrupt) -> (Status, Vec<Remark>) {
     let mut remarks = Vec::new();
-    for Ended { name, outcome, early } in runs {
+    for Ended { name, outcome, metrics, early } in runs {
         if let Some(told) = early {
             let advice = match (outcome.ending, solver) {
                 (Ending::Diverged { .. }, Solver::Table3 { .. }) => "; a smaller --step may help",
@@ -205,9 +217,11 @@ fn status(runs: &[Ended], solver: Solver, interrupt: &Interrupt) -> (Status, Vec
             };
             remarks.push(Remark::Error(format!("the run \"{name}\" {told}{advice}")));
         }
-        remarks.extend(hidden("run", name, outcome).map(Remark::Warning));
+        remarks.extend(unreliable(name, outcome, metrics).map(Remark::Warning));
     }
-    let relied = |run: &Ended| run.outcome.ending == Ending::Complete && hidden("run", run.name, run.outcome).is_none();
+    let relied = |run: &Ended| {
+        run.outcome.ending == Ending::Complete && unreliable(run.name, run.outcome, run.metrics).is_none()
+    };
     let status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if runs.iter().all(relied) => Status::Done,

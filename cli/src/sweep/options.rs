@@ -25,6 +25,7 @@ pub fn with_changes(args: &Args) -> Result<Common> {
     put("indices", args.indices.then(|| "true".to_string()));
     let figures = args.figures.iter().map(|name| format!("{:?}", name.trim())).collect::<Vec<_>>().join(", ");
     put("figures", (!args.figures.is_empty()).then(|| format!("[{figures}]")));
+    let mut keys: Vec<&str> = Vec::new();
     for vary in &args.vary {
         let wrong = || {
             Error::new(format!("\"{vary}\" does not say how something varies"))
@@ -37,6 +38,10 @@ pub fn with_changes(args: &Args) -> Result<Common> {
         if key.is_empty() || how.is_empty() || key.contains(['"', '\\']) {
             return Err(wrong());
         }
+        if keys.contains(&key) {
+            return Err(Error::new(format!("{key} varies twice")).in_file("--vary").next("leave one of the two out"));
+        }
+        keys.push(key);
         put(&format!("vary.\"{key}\""), Some(how.to_string()));
     }
     Ok(common)

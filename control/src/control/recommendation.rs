@@ -157,6 +157,10 @@ pub fn recommend(args: &Question, files: &[PathBuf]) -> Result<Findings> {
         {
             moves_along_both(&a.file, first)?;
             moves_along_both(&b.file, second)?;
+            if first.axes == second.axes {
+                let error = Error::new(format!("the same values as in {}", a.file.display())).in_file(&b.file);
+                return Err(error.allowed("a second test").next(format!("give {DIAGONALS}")));
+            }
             Some(Diagonals::new(first, second))
         }
         _ => None,

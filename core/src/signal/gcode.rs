@@ -117,6 +117,10 @@ fn block(line: &str, state: &mut State, limits: &Limits, legs: &mut Vec<Leg<Vec<
             ('P', value) if value >= 0.0 => wait = Some(value * 1e-3),
             ('S', value) if value >= 0.0 => wait = Some(value),
             ('N', _) => {}
+            ('G', 28.0 | 92.0) if in_plane => {
+                return Err(Error::new(format!("`G{value}` with X or Y homes the axes or moves their zero"))
+                    .next("leave it out, and write all positions from one zero"));
+            }
             ('E' | 'Z', _) if in_plane => {}
             (letter, value) => match coordinate {
                 Some(k) => to[k] = Some(value),
@@ -267,6 +271,8 @@ mod tests {
         assert!(what("G2 R10 F3000\nG2 X10 Y0 R10").contains("ends where it begins"));
         assert!(what("G1 X0 I10 F3000").contains("belong to G2 and G3"));
         assert!(what("G2 X0 Y10 R10").contains("before any feed"));
+        assert!(what("G92 X0").contains("homes the axes or moves their zero"));
+        assert!(legs("G92 E0\nG28\nG1 X20 F3000", &[0.01, 0.0], &LIMITS).is_ok());
         let axis = legs("G2 X10 I5 F3000", &[0.0], &LIMITS).unwrap_err();
         assert!(axis.what.contains("`G2` is not known"), "{}", axis.what);
     }

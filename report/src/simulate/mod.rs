@@ -18,7 +18,7 @@ pub use page::report;
 pub use plots::{Named, named};
 pub use rows::{
     accuracy, cost, early_end, ended_early, events, hidden, lines, machine, plain, solver_words, speed, time, travel,
-    value,
+    value, yawed,
 };
 
 use std::time::Duration;

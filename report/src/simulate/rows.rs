@@ -267,6 +267,20 @@ fn ties(ties: &[Tie]) -> String {
     format!("; decided within rounding at {}{more}", each.collect::<Vec<_>>().join(", "))
 }
 
+/// The yaw of a bridge from which on its equations, of first order in it, are too coarse, rad: its square is then a
+/// hundredth.
+const LARGE_YAW: f64 = 0.1;
+
+/// The word for a run whose bridge yaws beyond its model.
+pub fn yawed(name: &str, metrics: &Metrics) -> Option<String> {
+    let peak = metrics.yaw.map(|yaw| yaw.peak.value.abs()).filter(|peak| *peak > LARGE_YAW)?;
+    let [peak, most] = [peak, LARGE_YAW].map(|angle| value(angle, "rad"));
+    Some(format!(
+        "the run \"{name}\" is not to be relied on: the bridge yaws by up to {peak}, and its equations are for less than \
+         {most}; check the stiffness and damping of its bearings"
+    ))
+}
+
 /// The word for a result of a "run" or a "move" that its error hides.
 pub fn hidden(what: &str, name: &str, outcome: &Outcome) -> Option<String> {
     let error = outcome.error.filter(|error| error.hides_motion())?;
@@ -347,6 +361,7 @@ fn stop(metrics: &Metrics, labels: &[&str], solver: Solver) -> String {
                 metrics.drives.iter().map(|drive| drive.shaft_speed).max_by(|a, b| a.abs().total_cmp(&b.abs()));
             format!("the rotor still turns at the end, at {}", value(fastest.unwrap_or_default(), "rad/s"))
         }
+        None if metrics.is_still() => "it does not move at the end, and no friction holds it".into(),
         None => format!("still moving at the end, {}", speeds()),
     }
 }

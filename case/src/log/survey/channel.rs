@@ -16,6 +16,12 @@ const OUTLYING: f64 = 10.0;
 const JUMP: f64 = 5.0;
 const BESIDE: usize = 3;
 
+/// Steps on either side of a zero that a magnitude turns at are so many times the resolution, are alike within this
+/// factor, and end there within this factor of straight lines.
+const FOLDED: f64 = 3.0;
+const FOLD_ALIKE: f64 = 2.0;
+const FOLD_SHARP: f64 = 1.7;
+
 /// The mean speed over a held value is within this factor of the speeds before and behind it.
 const CAUGHT_UP: f64 = 2.0;
 
@@ -65,6 +71,8 @@ pub struct Channel {
     pub jumps: Vec<Jump>,
     /// Runs of a position that keep one value although the motion goes on.
     pub held: Vec<Held>,
+    /// Times at which a position or speed that is nowhere negative turns at zero without slowing down, s.
+    pub folds: Vec<f64>,
     /// How many different values there are, counted up to 1000.
     pub levels: usize,
 }
@@ -141,6 +149,7 @@ impl Channel {
             wraps: 0,
             jumps: Vec::new(),
             held: Vec::new(),
+            folds: Vec::new(),
             levels: sorted.len().min(1000),
         };
         channel.wraps = channel.count_wraps(values);
@@ -148,6 +157,7 @@ impl Channel {
             channel.held = channel.find_held(values, time);
             channel.jumps = channel.find_jumps(values, time);
         }
+        channel.folds = channel.find_folds(values, time);
         channel.outliers = channel.find_outliers(values, time);
         channel.clipped = channel.find_clipped(values, time);
         channel
@@ -181,8 +191,37 @@ impl Channel {
         self.name.ends_with("input")
     }
 
+    fn quantity(&self) -> Option<Quantity> {
+        Quantity::all().find(|quantity| quantity.name() == self.name)
+    }
+
     fn is_position(&self) -> bool {
-        Quantity::all().any(|quantity| quantity.name() == self.name && quantity.is_position())
+        self.quantity().is_some_and(|quantity| quantity.is_position())
+    }
+
+    /// Where |x| turns at zero, if x passes it: samples a, b, c at b's minimum with steps of s on both sides have
+    /// a + c = 2 s, of which a smooth turn has a fifth.
+    fn find_folds(&self, values: &[f64], time: &[f64]) -> Vec<f64> {
+        let resolution = self.resolution();
+        let is_signed = |quantity: Quantity| quantity.is_position() || quantity.is_speed();
+        if !self.quantity().is_some_and(is_signed) || self.least < -FOLDED * resolution {
+            return Vec::new();
+        }
+        let reach = BESIDE + 1;
+        let is_fold = |k: &usize| {
+            let k = *k;
+            let step = |from: usize, to: usize| (values[from] - values[to]) / BESIDE as f64;
+            let (fall, rise) = (step(k - reach, k - 1), step(k + reach, k + 1));
+            let both = fall + rise;
+            let apart = values[k - 1] + values[k + 1];
+            let is_least = values[k] <= values[k - 1] && values[k] < values[k + 1];
+            is_least
+                && fall.min(rise) > FOLDED * resolution
+                && (1.0 / FOLD_ALIKE..FOLD_ALIKE).contains(&(fall / rise))
+                && (1.0 / FOLD_SHARP..FOLD_SHARP).contains(&(apart / both))
+                && values[k] < both
+        };
+        (reach..values.len().saturating_sub(reach)).filter(is_fold).map(|k| time[k]).collect()
     }
 
     /// Runs of equal values of a position that moves on both sides of them, and whose next value is where the motion
@@ -412,6 +451,21 @@ impl Channel {
                 format!("it jumps by {turn} {} times: a counter that wraps; unwrap it before use", self.wraps),
             );
         }
+        if let Some(output) = output.filter(|output| !output.absolute)
+            && let Some(first) = self.folds.first()
+        {
+            let times = match self.folds.len() {
+                1 => String::new(),
+                n => format!(", and {} more times", n - 1),
+            };
+            let text = format!(
+                "it is nowhere negative and turns at zero without slowing down, at {}{times}, as a magnitude does; log \
+                 it with its sign, or set absolute = [\"{}\"]",
+                seconds(*first),
+                output.quantity.name()
+            );
+            note("magnitude", Severity::Suspicion, text);
+        }
         if let Some(longest) = self.held.iter().max_by_key(|held| held.samples) {
             let n: usize = self.held.iter().map(|held| held.samples).sum();
             let (travel, at) = (value(longest.travel.abs()), seconds(longest.time));
@@ -478,6 +532,7 @@ impl Channel {
     fn remedy(&self, code: &str, output: &Output) -> Option<Remedy> {
         match code {
             "wraps" => self.turn().map(|turn| Remedy::Unwrap(output.quantity, turn)),
+            "magnitude" => Some(Remedy::Magnitude(output.quantity)),
             "jumps" => Some(Remedy::Step(output.quantity, self.jumps.clone())),
             "held" => {
                 let samples = self.held.iter().flat_map(|held| held.sample..held.sample + held.samples).collect();

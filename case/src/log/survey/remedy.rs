@@ -18,6 +18,8 @@ pub enum Remedy {
     Ratio(Quantity, Quantity, f64),
     /// Two outputs change places.
     Exchange(Quantity, Quantity),
+    /// An output that is a magnitude.
+    Magnitude(Quantity),
     /// Jumps of this size taken out of an output.
     Unwrap(Quantity, f64),
     /// Jumps taken out of an output.
@@ -58,6 +60,9 @@ impl Remedy {
                         quantity => quantity,
                     };
                 }
+            }
+            Self::Magnitude(quantity) => {
+                log.outputs.iter_mut().filter(|output| output.quantity == *quantity).for_each(|o| o.absolute = true);
             }
             Self::Unwrap(quantity, turn) => of(quantity, &mut |values| unwrap(values, *turn)),
             Self::Step(quantity, jumps) => of(quantity, &mut |values| {

@@ -3,6 +3,7 @@
 use super::least_squares::minimise;
 use super::point::{Ending, Minimum, Options};
 use super::regression::regression;
+use super::triangle::inverse_of_square;
 use crate::case::{Case, Plan};
 use crate::chance;
 use crate::error::{Error, Result};
@@ -17,9 +18,10 @@ use crate::fit::limits::{
 use crate::log::Quantity;
 use crate::reach::resonance::{Drive, resonances};
 use crate::solve::Flow;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// The effort of a fit.
@@ -215,13 +217,23 @@ fn uniform(problem: &Problem) -> bool {
 }
 
 /// True if the residuals of positions oscillate throughout: they change sign often and never keep it for long, unlike
-/// those of a wrong model.
+/// those of a wrong model. They are taken as a fit without priors would leave them, r − J (JᵀJ)⁻¹ Jᵀ r: a first value
+/// that is far off, and believed, pulls all others aside.
 fn swings(problem: &Problem, at: &Minimum) -> bool {
-    let all = problem.runs.iter().enumerate().flat_map(|(index, run)| {
+    let outputs = problem.runs.iter().enumerate().flat_map(|(index, run)| {
         let (first, n) = (problem.first_row(index), run.time.len());
         let own = run.seen.iter().enumerate().filter(|(_, seen)| seen.quantity.is_position());
-        own.map(move |(output, _)| &at.residuals[first + output * n..first + (output + 1) * n])
+        own.map(move |(output, _)| first + output * n..first + (output + 1) * n)
     });
+    let outputs: Vec<Range<usize>> = outputs.collect();
+    let rows: Vec<usize> = outputs.iter().cloned().flatten().collect();
+    let free: Vec<usize> = (0..at.jacobian.ncols()).filter(|&j| !at.at_bound[j]).collect();
+    let jacobian = at.jacobian.select_rows(&rows).select_columns(&free);
+    let residuals = DVector::from_iterator(rows.len(), rows.iter().map(|&row| at.residuals[row]));
+    let left = match inverse_of_square(&jacobian) {
+        Some(inverse) => &residuals - &jacobian * (inverse * jacobian.tr_mul(&residuals)),
+        None => residuals,
+    };
     let is_swinging = |values: &[f64]| {
         let mean = values.iter().sum::<f64>() / values.len().max(1) as f64;
         let (mut longest, mut since) = (0, 0);
@@ -233,11 +245,13 @@ fn swings(problem: &Problem, at: &Minimum) -> bool {
         }
         !values.is_empty() && (longest as f64) < SWINGS_KEEP * values.len() as f64
     };
-    let mut any = false;
-    all.into_iter().all(|values| {
-        any = true;
-        is_swinging(values)
-    }) && any
+    let mut rest = left.as_slice();
+    !outputs.is_empty()
+        && outputs.iter().all(|range| {
+            let (own, behind) = rest.split_at(range.len());
+            rest = behind;
+            is_swinging(own)
+        })
 }
 
 /// True if the prior of the start may have errors like the residuals, so that it depends on their weight.

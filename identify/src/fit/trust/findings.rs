@@ -38,7 +38,7 @@ pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, su
     let follows = ["time-unit", "interruption", "unexplained"];
     all.retain(|one| !(follows.contains(&one.code) && one.log.as_ref().is_some_and(|log| astray.contains(log))));
     let is_named = all.iter().any(|one| one.grade == Grade::Warning || one.code == "other_law") || fit.cause.is_some();
-    all.extend(of_noise(found, is_named));
+    all.extend(of_noise(found, fit, is_named));
     all.sort_by_key(|finding| std::cmp::Reverse(finding.grade));
     all
 }
@@ -117,7 +117,8 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
 
 /// Residuals above the noise of the logs. With several coordinates or a stepper, elastic modes cause local minima; with
 /// one coordinate the missing elements have been tried, and `is_named` if one of them, or another reason, is reported.
-fn of_noise(found: &Searched, is_named: bool) -> Option<Finding> {
+/// A vibration cannot be told from narrow-band noise.
+fn of_noise(found: &Searched, fit: &Fit, is_named: bool) -> Option<Finding> {
     let problem = &found.problem;
     let is_searched = problem.machine.has_torque_balance();
     if problem.parameters.is_empty() || is_searched && is_named {
@@ -126,7 +127,17 @@ fn of_noise(found: &Searched, is_named: bool) -> Option<Finding> {
     let most = if is_searched { FAR_BEYOND_NOISE } else { MORE_THAN_NOISE };
     let beyond: Vec<(Quantity, f64)> = found.times_noise().filter(|(_, times)| *times > most).collect();
     let named = |(quantity, times): &(Quantity, f64)| format!("{} {} times", quantity.name(), significant(*times, 2));
-    let next = if is_searched {
+    let oscillating = |(quantity, _): &(Quantity, f64)| fit.oscillations.iter().find(|(own, _)| own == quantity);
+    let frequencies: Option<Vec<String>> = beyond
+        .iter()
+        .map(|own| oscillating(own).map(|(_, hertz)| engineering(*hertz, "Hz", 2).replace('\u{a0}', " ")))
+        .collect();
+    let next = if let (true, Some(frequencies)) = (is_searched, frequencies) {
+        &format!(
+            "they oscillate at {}, by a vibration that the model lacks or by noise, for which the intervals allow",
+            frequencies.join(" and ")
+        )
+    } else if is_searched {
         "the model lacks something that none of the tried elements explains, and the intervals hold only as far as what \
          is missing resembles noise"
     } else {

@@ -40,6 +40,8 @@ pub struct Fit {
     pub cause: Option<Cause>,
     /// Errors of an output that repeat with position.
     pub waves: Vec<Wave>,
+    /// Outputs whose noise oscillates, with its frequency, Hz.
+    pub(crate) oscillations: Vec<(Quantity, f64)>,
     /// Findings on logs and search, warnings first.
     pub findings: Vec<Finding>,
     /// The variables of the search where it ended.

@@ -43,10 +43,11 @@ impl Settled<'_> {
         };
         let disagreement = sub_records::disagreement(case, plan, &self.searched, &judged);
         let other_law = other_laws::other_law(&self.searched, &judged);
-        // No element reverses a motion, or moves an input by more than a delay.
+        // No element reverses a motion, folds it, or moves an input by more than a delay.
         let found = &self.searched;
         let is_asked = !trials::is_reversed(case, plan, found)
             && causes::is_asked(case, plan, found, &judged)
+            && !trials::is_magnitude(case, plan, found)
             && !trials::is_shifted(case, plan, found);
         let cause = is_asked.then(|| causes::cause(case, plan, found, other_law.as_ref())).flatten();
         let other_law = other_law.filter(|_| cause.is_none());

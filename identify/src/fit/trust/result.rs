@@ -130,6 +130,7 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         other_law: judged.and_then(|judged| judged.other_law.clone()),
         cause: judged.and_then(|judged| judged.cause.clone()),
         waves: judged.iter().flat_map(|judged| &judged.spreads).flat_map(|spread| spread.waves.clone()).collect(),
+        oscillations: judged.map_or(Vec::new(), |judged| judged.oscillations(problem)),
         findings: Vec::new(),
         point: best.x.clone(),
         ending: best.ending,

@@ -10,7 +10,9 @@ use crate::fit::asked::problem::Problem;
 use crate::fit::limits::NORMAL;
 use crate::fit::noise::{self, Slow, Spread, Wave, half_width};
 use crate::fit::search::triangle::inverse_of_square;
+use crate::log::Quantity;
 use nalgebra::{DMatrix, DVector};
+use std::f64::consts::TAU;
 
 /// Covariance of the free variables, in their order; exists only if they are determined.
 #[derive(Debug, Clone)]
@@ -138,12 +140,19 @@ impl Judged {
         (self.disagreement, self.other_law, self.cause) = (disagreement, other_law, cause);
     }
 
+    /// Outputs whose noise oscillates, with its frequency, Hz.
+    pub fn oscillations(&self, problem: &Problem) -> Vec<(Quantity, f64)> {
+        let of = |spread: &Spread| spread.slow.iter().map(|slow| slow.frequency).find(|frequency| *frequency > 0.0);
+        let all = self.spreads.iter().zip(problem.quantities());
+        all.filter_map(|(spread, quantity)| Some((quantity, of(spread)? / TAU))).collect()
+    }
+
     /// The autocorrelation of the residuals, in words.
     pub fn slow_words(&self, problem: &Problem) -> String {
         let quantities = problem.quantities();
         let shown = |value: f64, unit| crate::number::engineering(value, unit, 2).replace('\u{a0}', " ");
         let told_time = |slow: &Slow| match slow.frequency > 0.0 {
-            true => format!("oscillations of {}", shown(slow.frequency / std::f64::consts::TAU, "Hz")),
+            true => format!("oscillations of {}", shown(slow.frequency / TAU, "Hz")),
             false => shown(slow.time, "s"),
         };
         let mut told = Vec::new();

@@ -361,6 +361,22 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         (seat.law, seat.reads) = (None, false);
     }
 
+    /// Takes up inputs that change at the end of the run, where the values after the change are seen, too; false as
+    /// [`Self::take_up`].
+    fn take_last_input(&mut self, lane: usize) -> bool {
+        if let Some(seat) = &mut self.seats[lane] {
+            seat.pieces = Pieces::of(&seat.experiment.inputs, seat.end);
+        }
+        self.take_input(lane);
+        if !self.take_up(lane) {
+            return false;
+        }
+        if let Some(seat) = &mut self.seats[lane] {
+            seat.see_values(seat.end);
+        }
+        true
+    }
+
     /// Brings a machine to where its lane can go on, or to the end of its runs.
     fn attend(&mut self, lane: usize) {
         loop {
@@ -377,6 +393,10 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             if length - core.common.offset <= near {
                 core.count_from(seat.piece_end);
                 if seat.piece_end >= seat.end {
+                    let is_changed = seat.pieces.end <= seat.end;
+                    if is_changed && !self.take_last_input(lane) {
+                        return self.give_up(lane);
+                    }
                     return self.end_run(lane);
                 }
                 seat.pieces = Pieces::of(&seat.experiment.inputs, seat.piece_end);
@@ -454,11 +474,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         seat.core.common.rules.since_change += length - begin;
         seat.core.common.offset = length;
         // Values that are held have no peaks but those at the beginning.
-        for slot in 0..seat.tops.len() {
-            let quantity = seat.law().readings.with(slot, &seat.core.z);
-            let value = quantity.form.value(&seat.plan.of(&seat.core.z));
-            seat.see_value(slot, value, base + begin);
-        }
+        seat.see_values(base + begin);
         if seat.watcher.observed().steady().is_some() {
             let seen = *seat.kept.seen.last().expect("a last quantity");
             let quantity = seat.law().readings.with(seen.slot, &seat.core.z);
@@ -687,6 +703,15 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
 impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
     fn law(&self) -> &Law<N, S, D> {
         &self.kept.laws[self.law.expect("taken up")]
+    }
+
+    /// Takes the values of all slots now.
+    fn see_values(&mut self, now: f64) {
+        for slot in 0..self.tops.len() {
+            let quantity = self.law().readings.with(slot, &self.core.z);
+            let value = quantity.form.value(&self.plan.of(&self.core.z));
+            self.see_value(slot, value, now);
+        }
     }
 
     /// Takes the value of a slot now, if it is the largest so far.
