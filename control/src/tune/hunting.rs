@@ -6,7 +6,7 @@
 //! and the time of the next slip if no observation is long enough. Machines with several drives are observed without
 //! it.
 
-use crate::control::{Loop, Rows, Standard, each, stream};
+use crate::control::{Loop, Standard, each, recorded};
 use crate::design::Design;
 use crate::error::Result;
 use crate::friction::Side;
@@ -278,7 +278,6 @@ fn seen(
     let from = Profile::last_end(&profiles);
     let until = from + watched;
     let mut controllers = Standard::of_drives(design, model)?;
-    let rows = Rows { until, every: design.every.min(until), window: 1e-4 };
     let geometry = machine.geometry();
     let column = |slide: &SlideAt| format!("{}_position", geometry.label(slide.body).key);
     let columns: Vec<String> = geometry.slides.iter().map(column).collect();
@@ -292,9 +291,9 @@ fn seen(
         Flow::Continue
     };
     let (timing, solver) = (Loop::of(design), Solver::of(machine));
-    let run = stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, true, &mut take)?;
+    let samples = recorded(machine, &mut each(&mut controllers), (&timing, &profiles), until, solver, &mut take)?;
     // The last eighth of the observation.
-    let late = run.kept.iter().filter(|sample| sample.drive == 0 && sample.time >= until - 0.125 * watched);
+    let late = samples.iter().filter(|sample| sample.drive == 0 && sample.time >= until - 0.125 * watched);
     let command: Vec<(f64, f64)> = late.map(|sample| (sample.time, sample.given)).collect();
     let command_now = command.last().map_or(0.0, |(_, given)| *given);
     Ok(Seen { swing: widest(&slides, swung), slides, command: command_now, slope: slope(&command) })

@@ -121,9 +121,10 @@ impl Mul for Jet {
 
     fn mul(self, other: Self) -> Self {
         let ([a, b, c], [p, q, r]) = (self.c, other.c);
-        let [size, other_size] = [self.polynomial(), other.polynomial()];
+        let (sizes, other_sizes) = (self.c.map(|c| c.norm()), other.c.map(|c| c.norm()));
+        let [size, other_size]: [f64; 2] = [sizes.iter().sum(), other_sizes.iter().sum()];
         // Terms in t³ and t⁴ belong to the radius.
-        let higher = b.norm() * r.norm() + c.norm() * (q.norm() + r.norm());
+        let higher = sizes[1] * other_sizes[2] + sizes[2] * (other_sizes[1] + other_sizes[2]);
         let mixed = self.radius * (other_size + other.radius) + other.radius * size;
         Self { c: [a * p, a * q + b * p, a * r + b * q + c * p], radius: higher + mixed + ROUNDING * size * other_size }
     }
