@@ -72,7 +72,11 @@ pub struct Hunt {
 /// Observes the closed loop after a slow reversal; none if the cart comes to rest. An unstable loop hunts as well,
 /// without any of the listed causes.
 pub fn hunting(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
-    let Some((hunt, start)) = hunts_from(machine, design)? else { return Ok(None) };
+    observed(machine, design)?.map(|found| with_causes(machine, design, found)).transpose()
+}
+
+/// A limit cycle with its necessary causes.
+pub(super) fn with_causes(machine: &Machine, design: &Design, (hunt, start): (Hunt, f64)) -> Result<Hunt> {
     let watched = watch(machine, design);
     let mut needs = Vec::new();
     let mut without = |word: &'static str, stage_without: &Machine, design: &Design| -> Result<()> {
@@ -103,16 +107,11 @@ pub fn hunting(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
         let finer = Machine { encoder: finer(machine.encoder), scale: finer(machine.scale), ..machine.clone() };
         without("encoder counts", &finer, design)?;
     }
-    Ok(Some(Hunt { needs, ..hunt }))
+    Ok(Hunt { needs, ..hunt })
 }
 
-/// The limit cycle without its causes.
-pub(super) fn hunts(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
-    Ok(hunts_from(machine, design)?.map(|(hunt, _)| hunt))
-}
-
-/// The limit cycle, and the fraction of the stroke at which it was observed.
-fn hunts_from(machine: &Machine, design: &Design) -> Result<Option<(Hunt, f64)>> {
+/// The limit cycle without its causes, and the fraction of the stroke at which it was observed.
+pub(super) fn observed(machine: &Machine, design: &Design) -> Result<Option<(Hunt, f64)>> {
     for start in STARTS {
         if let Some(hunt) = hunts_at(machine, design, start)? {
             return Ok(Some((hunt, start)));
