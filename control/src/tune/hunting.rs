@@ -69,6 +69,9 @@ pub struct Hunt {
     pub watched: f64,
 }
 
+/// A limit cycle, and the fraction of the stroke after which it was observed.
+pub(super) type Observed = (Hunt, f64);
+
 /// Observes the closed loop after a slow reversal; none if the cart comes to rest. An unstable loop hunts as well,
 /// without any of the listed causes.
 pub fn hunting(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
@@ -76,7 +79,7 @@ pub fn hunting(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
 }
 
 /// A limit cycle with its necessary causes.
-pub(super) fn with_causes(machine: &Machine, design: &Design, (hunt, start): (Hunt, f64)) -> Result<Hunt> {
+pub(super) fn with_causes(machine: &Machine, design: &Design, (hunt, start): Observed) -> Result<Hunt> {
     let watched = watch(machine, design);
     let mut needs = Vec::new();
     let mut without = |word: &'static str, stage_without: &Machine, design: &Design| -> Result<()> {
@@ -110,8 +113,8 @@ pub(super) fn with_causes(machine: &Machine, design: &Design, (hunt, start): (Hu
     Ok(Hunt { needs, ..hunt })
 }
 
-/// The limit cycle without its causes, and the fraction of the stroke at which it was observed.
-pub(super) fn observed(machine: &Machine, design: &Design) -> Result<Option<(Hunt, f64)>> {
+/// Observes the limit cycle without its causes.
+pub(super) fn observed(machine: &Machine, design: &Design) -> Result<Option<Observed>> {
     for start in STARTS {
         if let Some(hunt) = hunts_at(machine, design, start)? {
             return Ok(Some((hunt, start)));

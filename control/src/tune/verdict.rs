@@ -1,7 +1,7 @@
 //! Verdict on a controller over the family, and comparison of two verdicts.
 
 use super::family::{Corner, Family, modes_along};
-use super::hunting::{self, Hunt};
+use super::hunting::{self, Observed};
 use super::judged::{Figure, Forced, Judgement, Least, Limit, MoveVerdict, Standing, Verdict, Worse};
 use super::margins::Margins;
 use super::objective::{AtWorst, BALANCES, MoveFigures, Runner, objective};
@@ -82,7 +82,7 @@ impl Work<'_> {
     }
 
     /// The limit cycle of a design on the nominal machine, observed once.
-    fn hunt(&self, design: &Design) -> Result<Option<(Hunt, f64)>> {
+    fn hunt(&self, design: &Design) -> Result<Option<Observed>> {
         if let Some((_, known)) = self.hunts.borrow().iter().find(|(known, _)| known == design) {
             return Ok(known.clone());
         }

@@ -3,7 +3,7 @@
 
 use super::family::{Family, modes_along};
 use super::gains::{self, rounded, searched, shaped};
-use super::hunting::Hunt;
+use super::hunting::Observed;
 use super::judged::Verdict;
 use super::margins::{Margins, Peaks, Rough};
 use super::plant::Plant;
@@ -69,7 +69,7 @@ pub(super) struct Work<'a> {
     /// Computed verdicts.
     pub known: RefCell<Vec<Verdict>>,
     /// Designs whose limit cycle was looked for, with what was observed.
-    pub hunts: RefCell<Vec<(Design, Option<(Hunt, f64)>)>>,
+    pub hunts: RefCell<Vec<(Design, Option<Observed>)>>,
     pub stop: &'a dyn Fn() -> bool,
 }
 
