@@ -105,6 +105,25 @@ pub(super) fn unrecorded(
     Ok(driven(run, machine, experiment, &mut sampled, see))
 }
 
+/// Runs controllers along their profiles until `until`, s, with a row at each sample, and returns the samples: rows and
+/// samples of [`stream`], to the last bit, without its figures.
+pub(crate) fn recorded(
+    machine: &Machine,
+    controllers: &mut [&mut dyn Controller],
+    (timing, profiles): (&Loop, &[Profile]),
+    until: f64,
+    solver: Solver,
+    sink: &mut dyn FnMut(&Trajectory) -> Flow,
+) -> Result<Vec<Sample>> {
+    timing.check(until)?;
+    let experiment = at_rest(machine, profiles, until, timing.every.min(until));
+    controllers.iter_mut().for_each(|controller| controller.reset());
+    let mut sampled = Sampled::new(machine, controllers, *timing, profiles, true).until(until);
+    let run = solve::Run::new(machine, &experiment, solver, Detail::Full, None, sink)?;
+    driven(run, machine, &experiment, &mut sampled, |_, _, _| {});
+    Ok(sampled.kept.unwrap_or_default())
+}
+
 /// Runs to the end: steppers along their references, other motors by sampled controllers.
 pub(super) fn driven(
     mut run: solve::Run,
@@ -242,4 +261,49 @@ pub fn follow(
     let mut run = solve::Run::new(&machine, experiment, solver, Detail::Full, None, sink)?;
     sampled.drive(&mut run, experiment.until, |_, _, _| {});
     Ok(run.finish())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+    use std::path::Path;
+
+    /// Rows and samples without figures are those with figures, to the last bit: of an axis with a delayed command, of an
+    /// H-frame and of a CoreXY.
+    #[test]
+    fn figures_do_not_change_a_run() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages");
+        for name in ["sollmann-jouaneh/controllers/pid-elastic.toml", "h-frame/square.toml", "core-xy/square.toml"] {
+            let case = Case::read(folder.join(name)).unwrap();
+            let (machine, design) = (&case.machine, case.controller.as_ref().unwrap());
+            let (motion, timing) = (&case.moves[0], Loop::of(design));
+            let (profiles, until, solver) = (motion.references(design), motion.until, Solver::of(machine));
+            let rows = Rows { until, every: design.every, window: motion.window };
+            let mut own = Standard::of_drives(design, machine).unwrap();
+            let (mut whole, mut alone) = (Trajectory::default(), Trajectory::default());
+            let gather = |all: &mut Trajectory, block: &Trajectory| {
+                if all.columns.is_empty() {
+                    *all = Trajectory::with_capacity(&block.columns, 0);
+                }
+                all.append(block);
+                Flow::Continue
+            };
+            let sink = &mut |block: &Trajectory| gather(&mut whole, block);
+            let run = stream(machine, &mut each(&mut own), &timing, &profiles, &rows, solver, true, sink).unwrap();
+            let sink = &mut |block: &Trajectory| gather(&mut alone, block);
+            let samples = recorded(machine, &mut each(&mut own), (&timing, &profiles), until, solver, sink).unwrap();
+            assert!(alone.columns.len() > 10, "{name}");
+            for column in &alone.columns {
+                let bits = |values: &[f64]| values.iter().map(|value| value.to_bits()).collect::<Vec<_>>();
+                let (with, without) = (bits(whole.get(&column.name).unwrap()), bits(&column.values));
+                assert!(with == without && with.len() > 500, "{name}: {}", column.name);
+            }
+            assert_eq!(
+                (samples.len() as u64, samples),
+                (run.samples.0 * machine.drives.len() as u64, run.kept),
+                "{name}"
+            );
+        }
+    }
 }

@@ -13,8 +13,6 @@ pub(super) struct Sampled<'a, 'c> {
     controllers: &'a mut [&'c mut dyn Controller],
     /// Profile of each coordinate.
     profiles: &'a [Profile],
-    /// Weights of the coordinates in the position of each drive along the belt.
-    shares: Vec<&'static [f64]>,
     clocked: Clocked,
     /// Last command of each drive.
     pub(super) told: [Told; DRIVES],
@@ -58,7 +56,6 @@ impl<'a, 'c> Sampled<'a, 'c> {
         Self {
             controllers,
             profiles,
-            shares: machine.belt_shares(),
             clocked: Clocked::new(machine, timing),
             told: [Told::new(f64::INFINITY, f64::INFINITY); DRIVES],
             until: f64::INFINITY,
@@ -124,41 +121,17 @@ impl Sampled<'_, '_> {
         }
     }
 
-    /// References at `time`, s, now and one lead later: of each drive along the belt, and of all slides.
-    fn references(&self, time: f64) -> (References, [[Reference; SLIDES]; 2]) {
-        let lead = self.clocked.timing.lead;
-        let at = |time: f64| {
-            let mut slides = [Reference::default(); SLIDES];
-            slides.iter_mut().zip(self.profiles).for_each(|(slide, profile)| *slide = profile.at(time));
-            slides
-        };
-        let now = at(time);
-        let ahead = if lead == 0.0 { now } else { at(time + lead) };
-        let mut references = References::default();
-        for (weights, of_drive) in self.shares.iter().zip(&mut references) {
-            *of_drive = [&now, &ahead].map(|slides| {
-                let weighed = weights.iter().zip(slides);
-                weighed.fold(Reference::default(), |sum, (weight, slide)| sum.plus(*weight, *slide))
-            });
-        }
-        (references, [now, ahead])
-    }
-
     /// Inputs from now on and the end of their hold, s, from the state and the motors' currents, A, just before.
     fn decide(&mut self, state: &State, currents: &Commands) -> (Commands, f64) {
-        let every = self.clocked.timing.every;
+        let (every, lead) = (self.clocked.timing.every, self.clocked.timing.lead);
         let (time, before) = (self.clocked.next(), self.clocked.acting());
-        // A delayed command needs no reference.
-        let (references, slides) = match self.clocked.is_at_sample() {
-            false => Default::default(),
-            true => self.references(time),
-        };
-        let drives = self.controllers.len();
-        let slides = slides.each_ref().map(<[_; SLIDES]>::as_slice);
-        if let Some(decisions) = self.clocked.decide(self.controllers, (state, currents), (&references, slides)) {
+        let profiles = self.profiles;
+        let references = |time: f64| references(profiles, time, lead);
+        if let Some(decisions) = self.clocked.decide(self.controllers, (state, currents), references) {
             self.samples += 1;
             let mut is_limited = false;
-            for (drive, Decision { seen, asked, given }) in decisions.into_iter().take(drives).enumerate() {
+            let drives = self.controllers.len();
+            for (drive, &Decision { reference, measured, asked, given }) in decisions.iter().take(drives).enumerate() {
                 let told = &mut self.told[drive];
                 told.at_rest.see(time, given);
                 if given != asked {
@@ -166,7 +139,6 @@ impl Sampled<'_, '_> {
                     told.held_back += every.min(self.until - time).max(0.0);
                 }
                 if let Some(kept) = &mut self.kept {
-                    let (reference, measured) = (seen.reference.position, seen.position);
                     kept.push(Sample { time, drive, reference, measured, asked, given });
                 }
             }
@@ -182,4 +154,15 @@ impl Sampled<'_, '_> {
         }
         (acting, self.clocked.next())
     }
+}
+
+/// References of all slides at `time`, s, and one `lead` later, s.
+fn references(profiles: &[Profile], time: f64, lead: f64) -> References {
+    let at = |time: f64| {
+        let mut slides = [Reference::default(); SLIDES];
+        slides.iter_mut().zip(profiles).for_each(|(slide, profile)| *slide = profile.at(time));
+        slides
+    };
+    let now = at(time);
+    [now, if lead == 0.0 { now } else { at(time + lead) }]
 }

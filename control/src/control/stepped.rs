@@ -1,6 +1,6 @@
 //! A controller stepped from outside: the caller provides the reference, and the state of the machine at its samples.
 
-use super::sampled::{Controller, Loop, Observation, Sensors};
+use super::sampled::{Controller, Loop, Observation, SLIDES, Sensors};
 use super::standard::Standard;
 use crate::design::Design;
 use crate::error::Result;
@@ -17,6 +17,8 @@ pub(super) struct Clocked {
     clock: Interval,
     /// Sensors of each drive.
     sensors: Vec<Sensors>,
+    /// Weights of the slides in the position of each drive along the belt.
+    shares: Vec<&'static [f64]>,
     /// Next sample, and the next decision in it: the sample itself, or the start of a delayed command.
     k: u64,
     halfway: bool,
@@ -29,15 +31,17 @@ pub(super) struct Clocked {
 /// A command of each drive, V or A.
 pub(super) type Commands = [f64; DRIVES];
 
-/// References of each drive: at a sample, and one lead later.
-pub(super) type References = [[Reference; 2]; DRIVES];
+/// References of all slides, at a sample and one lead later.
+pub(super) type References = [[Reference; SLIDES]; 2];
 
 /// A command at a sample.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Decision {
-    /// Measurements and references at the sample.
-    pub seen: Observation,
-    /// The command before the limit and after it, V or A.
+    /// Reference of the drive, m along the belt.
+    pub reference: f64,
+    /// Measured position, m along the belt.
+    pub measured: f64,
+    /// The command before the limit, V or A.
     pub asked: f64,
     /// After it.
     pub given: f64,
@@ -50,6 +54,7 @@ impl Clocked {
             timing,
             clock: Interval::of(timing.every),
             sensors: Sensors::of(machine),
+            shares: machine.belt_shares(),
             k: 0,
             halfway: false,
             rest,
@@ -69,11 +74,6 @@ impl Clocked {
         self.clock.times(self.k) + if self.halfway { self.rest } else { 0.0 }
     }
 
-    /// True at a sample, false at the start of a delayed command.
-    pub(crate) fn is_at_sample(&self) -> bool {
-        !self.halfway
-    }
-
     /// The present commands.
     pub(crate) fn acting(&self) -> Commands {
         self.acting
@@ -85,13 +85,13 @@ impl Clocked {
         self.acting = self.waiting.pop_front().unwrap_or_default();
     }
 
-    /// Decides at [`Clocked::next`] for each drive; `slides` are the references of all slides, now and one lead later.
-    /// Returns the decisions if that is a sample. A delayed command needs nothing else.
+    /// Decides at [`Clocked::next`] from the state and the motors' currents, A; `references` are required at a sample.
+    /// Returns the decision of each drive if that is a sample; a delayed command needs nothing.
     pub fn decide(
         &mut self,
         controllers: &mut [&mut dyn Controller],
         (state, currents): (&State, &Commands),
-        (references, [slides, later]): (&References, [&[Reference]; 2]),
+        references: impl FnOnce(f64) -> References,
     ) -> Option<[Decision; DRIVES]> {
         if self.halfway {
             self.halfway = false;
@@ -99,33 +99,41 @@ impl Clocked {
             return None;
         }
         let time = self.clock.times(self.k);
+        let [slides, later] = references(time);
         let mut decisions = [Decision::default(); DRIVES];
+        let mut given = [0.0; DRIVES];
         for (drive, controller) in controllers.iter_mut().enumerate() {
-            let (sensors, [reference, ahead]) = (&self.sensors[drive], references[drive]);
+            let sensors = &self.sensors[drive];
+            let [reference, ahead] = [&slides, &later].map(|slides| along(self.shares[drive], slides));
+            let forward = controller.forward(&later);
             let seen = Observation {
                 time,
-                reference,
+                reference: controller.target(reference, &slides),
                 ahead,
                 position: sensors.position(state),
                 scale: sensors.scale(state),
                 current: currents[drive],
             };
-            let forward = controller.forward(later);
-            let target = controller.target(reference, slides);
-            let asked = controller.step(&Observation { reference: target, ..seen }) + forward;
+            let asked = controller.step(&seen) + forward;
             // NaN and infinity count as zero.
             let asked = if asked.is_finite() { asked } else { 0.0 };
-            let given = self.timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
-            controller.limited(given - forward);
-            decisions[drive] = Decision { seen, asked, given };
+            given[drive] = self.timing.limit.map_or(asked, |limit| asked.clamp(-limit, limit));
+            controller.limited(given[drive] - forward);
+            let (reference, measured, given) = (reference.position, seen.position, given[drive]);
+            decisions[drive] = Decision { reference, measured, asked, given };
         }
-        self.waiting.push_back(decisions.map(|decision| decision.given));
+        self.waiting.push_back(given);
         match self.rest > 0.0 {
             true => self.halfway = true,
             false => self.take_over(),
         }
         Some(decisions)
     }
+}
+
+/// The reference of a drive's part of the belt, from those of the slides.
+fn along(weights: &[f64], slides: &[Reference; SLIDES]) -> Reference {
+    weights.iter().zip(slides).fold(Reference::default(), |sum, (weight, slide)| sum.plus(*weight, *slide))
 }
 
 /// The controller of an axis with its clock, its delay and its limit, between two of its decisions. A clone continues
@@ -161,9 +169,14 @@ impl Stepped {
     /// acts until the next decision.
     pub fn decide(&mut self, state: &State, current: f64, reference: &Reference, ahead: Option<&Reference>) -> f64 {
         let ahead = ahead.copied().unwrap_or_else(|| after(reference, self.clocked.timing.lead));
-        let (mut currents, mut references) = (Commands::default(), References::default());
-        (currents[0], references[0]) = (current, [*reference, ahead]);
-        self.clocked.decide(&mut [&mut self.controller], (state, &currents), (&references, [&[*reference], &[ahead]]));
+        let mut currents = Commands::default();
+        currents[0] = current;
+        let references = [*reference, ahead].map(|reference| {
+            let mut slides = [Reference::default(); SLIDES];
+            slides[0] = reference;
+            slides
+        });
+        self.clocked.decide(&mut [&mut self.controller], (state, &currents), |_| references);
         self.command()
     }
 }

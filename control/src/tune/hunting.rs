@@ -6,7 +6,7 @@
 //! and the time of the next slip if no observation is long enough. Machines with several drives are observed without
 //! it.
 
-use crate::control::{Loop, Rows, Standard, each, stream};
+use crate::control::{Loop, Standard, each, recorded};
 use crate::design::Design;
 use crate::error::Result;
 use crate::friction::Side;
@@ -69,10 +69,17 @@ pub struct Hunt {
     pub watched: f64,
 }
 
+/// A limit cycle, and the fraction of the stroke after which it was observed.
+pub(super) type Observed = (Hunt, f64);
+
 /// Observes the closed loop after a slow reversal; none if the cart comes to rest. An unstable loop hunts as well,
 /// without any of the listed causes.
 pub fn hunting(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
-    let Some((hunt, start)) = hunts_from(machine, design)? else { return Ok(None) };
+    observed(machine, design)?.map(|found| with_causes(machine, design, found)).transpose()
+}
+
+/// A limit cycle with its necessary causes.
+pub(super) fn with_causes(machine: &Machine, design: &Design, (hunt, start): Observed) -> Result<Hunt> {
     let watched = watch(machine, design);
     let mut needs = Vec::new();
     let mut without = |word: &'static str, stage_without: &Machine, design: &Design| -> Result<()> {
@@ -103,16 +110,11 @@ pub fn hunting(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
         let finer = Machine { encoder: finer(machine.encoder), scale: finer(machine.scale), ..machine.clone() };
         without("encoder counts", &finer, design)?;
     }
-    Ok(Some(Hunt { needs, ..hunt }))
+    Ok(Hunt { needs, ..hunt })
 }
 
-/// The limit cycle without its causes.
-pub(super) fn hunts(machine: &Machine, design: &Design) -> Result<Option<Hunt>> {
-    Ok(hunts_from(machine, design)?.map(|(hunt, _)| hunt))
-}
-
-/// The limit cycle, and the fraction of the stroke at which it was observed.
-fn hunts_from(machine: &Machine, design: &Design) -> Result<Option<(Hunt, f64)>> {
+/// Observes the limit cycle without its causes.
+pub(super) fn observed(machine: &Machine, design: &Design) -> Result<Option<Observed>> {
     for start in STARTS {
         if let Some(hunt) = hunts_at(machine, design, start)? {
             return Ok(Some((hunt, start)));
@@ -278,7 +280,6 @@ fn seen(
     let from = Profile::last_end(&profiles);
     let until = from + watched;
     let mut controllers = Standard::of_drives(design, model)?;
-    let rows = Rows { until, every: design.every.min(until), window: 1e-4 };
     let geometry = machine.geometry();
     let column = |slide: &SlideAt| format!("{}_position", geometry.label(slide.body).key);
     let columns: Vec<String> = geometry.slides.iter().map(column).collect();
@@ -292,9 +293,9 @@ fn seen(
         Flow::Continue
     };
     let (timing, solver) = (Loop::of(design), Solver::of(machine));
-    let run = stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, true, &mut take)?;
+    let samples = recorded(machine, &mut each(&mut controllers), (&timing, &profiles), until, solver, &mut take)?;
     // The last eighth of the observation.
-    let late = run.kept.iter().filter(|sample| sample.drive == 0 && sample.time >= until - 0.125 * watched);
+    let late = samples.iter().filter(|sample| sample.drive == 0 && sample.time >= until - 0.125 * watched);
     let command: Vec<(f64, f64)> = late.map(|sample| (sample.time, sample.given)).collect();
     let command_now = command.last().map_or(0.0, |(_, given)| *given);
     Ok(Seen { swing: widest(&slides, swung), slides, command: command_now, slope: slope(&command) })

@@ -1,7 +1,7 @@
 //! Verdict on a controller over the family, and comparison of two verdicts.
 
 use super::family::{Corner, Family, modes_along};
-use super::hunting::{hunting, hunts};
+use super::hunting::{self, Observed};
 use super::judged::{Figure, Forced, Judgement, Least, Limit, MoveVerdict, Standing, Verdict, Worse};
 use super::margins::Margins;
 use super::objective::{AtWorst, BALANCES, MoveFigures, Runner, objective};
@@ -75,9 +75,20 @@ impl Verdict {
 impl Work<'_> {
     /// A verdict with its limit cycle at rest and the causes of it.
     pub fn watched(&self, verdict: Verdict) -> Result<Verdict> {
-        let hunt =
-            if verdict.nominal.stable && !(self.stop)() { hunting(&self.case.machine, &verdict.design)? } else { None };
+        let found = if verdict.nominal.stable && !(self.stop)() { self.hunt(&verdict.design)? } else { None };
+        let whole = |found| hunting::with_causes(&self.case.machine, &verdict.design, found);
+        let hunt = found.map(whole).transpose()?;
         Ok(Verdict { hunt, ..verdict })
+    }
+
+    /// The limit cycle of a design on the nominal machine, observed once.
+    fn hunt(&self, design: &Design) -> Result<Option<Observed>> {
+        if let Some((_, known)) = self.hunts.borrow().iter().find(|(known, _)| known == design) {
+            return Ok(known.clone());
+        }
+        let found = hunting::observed(&self.case.machine, design)?;
+        self.hunts.borrow_mut().push((design.clone(), found.clone()));
+        Ok(found)
     }
 
     /// The verdict on a design, computed once.
@@ -109,7 +120,7 @@ impl Work<'_> {
         if is_worse || !verdict.nominal.stable || (self.stop)() {
             return Ok(verdict);
         }
-        Ok(Verdict { hunt: hunts(&self.case.machine, &verdict.design)?, ..verdict })
+        Ok(Verdict { hunt: self.hunt(&verdict.design)?.map(|(hunt, _)| hunt), ..verdict })
     }
 
     fn judged(&self, design: &Design, (bar, order): (f64, &[usize])) -> Result<Option<Verdict>> {

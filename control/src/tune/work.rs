@@ -3,6 +3,7 @@
 
 use super::family::{Family, modes_along};
 use super::gains::{self, rounded, searched, shaped};
+use super::hunting::Observed;
 use super::judged::Verdict;
 use super::margins::{Margins, Peaks, Rough};
 use super::plant::Plant;
@@ -67,6 +68,8 @@ pub(super) struct Work<'a> {
     pub least: RefCell<Vec<f64>>,
     /// Computed verdicts.
     pub known: RefCell<Vec<Verdict>>,
+    /// Designs whose limit cycle was looked for, with what was observed.
+    pub hunts: RefCell<Vec<(Design, Option<Observed>)>>,
     pub stop: &'a dyn Fn() -> bool,
 }
 
@@ -120,6 +123,7 @@ impl<'a> Work<'a> {
             most: 0,
             least: RefCell::new(vec![0.0; moves.len()]),
             known: RefCell::default(),
+            hunts: RefCell::default(),
             stop,
         })
     }

@@ -14,7 +14,7 @@
 //! Bernstein's coefficients.
 
 use super::axis::Axis;
-use super::jet::Jet;
+use super::jet::{Jet, modulus};
 use super::tensor::Tensor;
 use crate::control::feedback::Feedback;
 use crate::tune::loops::Break;
@@ -192,7 +192,7 @@ impl Form {
     fn most(&self, table: &Table) -> [f64; 2] {
         let channels = table.center.len();
         let of = |values: &[f64]| {
-            [dot(&self.still, values).norm(), dot(&self.change, values).norm() + dot(&self.bend, values).norm()]
+            [modulus(dot(&self.still, values)), modulus(dot(&self.change, values)) + modulus(dot(&self.bend, values))]
         };
         let larger = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
         let nodes = table.nodes.chunks_exact(channels).map(of).fold([0.0; 2], larger);
@@ -392,7 +392,7 @@ type Node = [[Complex<f64>; 3]; 2];
 fn shown(table: &Table, closed: &Form, numerator: &Form, limit: f64) -> Seen {
     let channels = table.center.len();
     let [center, top] = [closed, numerator].map(|form| dot(&form.still, &table.center));
-    if top.norm() > limit * BEYOND * center.norm() + closed.other * limit + numerator.other {
+    if modulus(top) > limit * BEYOND * modulus(center) + closed.other * limit + numerator.other {
         return Seen::Violated;
     }
     // Δ and X of each node, and their change along the interval.
@@ -403,7 +403,7 @@ fn shown(table: &Table, closed: &Form, numerator: &Form, limit: f64) -> Seen {
     let minors: Vec<Node> = table.terms.iter().map(|term| at(term)).collect();
     let corners = nodes.iter().zip(&table.is_corner).filter(|(_, is_corner)| **is_corner);
     for (node, _) in corners {
-        if node[1][0].norm() > limit * BEYOND * node[0][0].norm() + closed.other * limit + numerator.other {
+        if modulus(node[1][0]) > limit * BEYOND * modulus(node[0][0]) + closed.other * limit + numerator.other {
             return Seen::Violated;
         }
     }
@@ -414,7 +414,8 @@ fn shown(table: &Table, closed: &Form, numerator: &Form, limit: f64) -> Seen {
     if check(true) {
         return Seen::TooWide;
     }
-    let weight = |linear: &Vec<f64>| limit * dot(&closed.still, linear).norm() + dot(&numerator.still, linear).norm();
+    let weight =
+        |linear: &Vec<f64>| limit * modulus(dot(&closed.still, linear)) + modulus(dot(&numerator.still, linear));
     let weights: Vec<f64> = table.linear.iter().map(weight).collect();
     let most = (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b]));
     match most {
@@ -438,7 +439,7 @@ fn is_shown(
     let away = |values: &Node, from: [Complex<f64>; 2]| {
         [0, 1].map(|k| {
             let [still, change, bend] = values[k];
-            (still - from[k]).norm() + along * (change.norm() + bend.norm())
+            modulus(still - from[k]) + along * (modulus(change) + modulus(bend))
         })
     };
     let mut off = radii;
@@ -455,11 +456,11 @@ fn is_shown(
         return false;
     }
     // Discs around both suffice for most.
-    if limit * (center.norm() - off[0]) >= top.norm() + off[1] {
+    if limit * (modulus(center) - off[0]) >= modulus(top) + off[1] {
         return true;
     }
-    let (directions, apart) = if off[1] < 0.95 * top.norm() {
-        let half = (off[1] / top.norm()).asin();
+    let (directions, apart) = if off[1] < 0.95 * modulus(top) {
+        let half = (off[1] / modulus(top)).asin();
         let count = (2.0 * half / BETWEEN).ceil().max(1.0);
         let apart = 2.0 * half / count;
         let first = top.arg() - half + 0.5 * apart;

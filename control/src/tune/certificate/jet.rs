@@ -13,6 +13,12 @@ pub(super) struct Jet {
     pub radius: f64,
 }
 
+/// |z| within two roundings; faster than `norm`, which is left to squares that under- or overflow.
+pub(super) fn modulus(z: Complex<f64>) -> f64 {
+    let square = z.norm_sqr();
+    if square > 1e-250 && square < 1e250 { square.sqrt() } else { z.norm() }
+}
+
 impl Jet {
     pub const ZERO: Self = Self { c: [Complex::ZERO; 3], radius: 0.0 };
     pub const ONE: Self = Self { c: [Complex::ONE, Complex::ZERO, Complex::ZERO], radius: 0.0 };
@@ -32,7 +38,7 @@ impl Jet {
         let center = Complex::new(0.0, 2.0 * half.im) * half;
         Self {
             c: [center, whole.c[1], whole.c[2]],
-            radius: b.abs().powi(3) / 6.0 + ROUNDING * (center.norm() + b.abs()),
+            radius: b.abs().powi(3) / 6.0 + ROUNDING * (modulus(center) + b.abs()),
         }
     }
 
@@ -72,11 +78,11 @@ impl Jet {
 
     /// Lower bound of |f|, not below zero.
     pub fn least(&self) -> f64 {
-        (self.c[0].norm() - self.c[1].norm() - self.c[2].norm() - self.radius).max(0.0)
+        (modulus(self.c[0]) - modulus(self.c[1]) - modulus(self.c[2]) - self.radius).max(0.0)
     }
 
     fn polynomial(&self) -> f64 {
-        self.c.iter().map(|c| c.norm()).sum()
+        self.c.map(modulus).iter().sum()
     }
 
     /// The same with a larger radius.
@@ -88,12 +94,12 @@ impl Jet {
     pub fn inverse(&self) -> Self {
         let first = self.c[0].inv();
         // f = c₀ (1 + q): 1/f = (1 − q + q² − q³/(1 + q))/c₀
-        let q = Self { c: [Complex::ZERO, self.c[1] * first, self.c[2] * first], radius: self.radius * first.norm() };
-        let size = q.most();
-        if size.is_nan() || size >= 1.0 {
+        let q = Self { c: [Complex::ZERO, self.c[1] * first, self.c[2] * first], radius: self.radius * modulus(first) };
+        let most = q.most();
+        if most.is_nan() || most >= 1.0 {
             return Self { radius: f64::INFINITY, ..Self::ZERO };
         }
-        let rest = (Self::ONE - q + q * q).within(size.powi(3) / (1.0 - size) + ROUNDING);
+        let rest = (Self::ONE - q + q * q).within(most.powi(3) / (1.0 - most) + ROUNDING);
         rest * first
     }
 }
@@ -121,11 +127,15 @@ impl Mul for Jet {
 
     fn mul(self, other: Self) -> Self {
         let ([a, b, c], [p, q, r]) = (self.c, other.c);
-        let [size, other_size] = [self.polynomial(), other.polynomial()];
+        let (sizes, other_sizes) = (self.c.map(modulus), other.c.map(modulus));
+        let (whole, other_whole): (f64, f64) = (sizes.iter().sum(), other_sizes.iter().sum());
         // Terms in t³ and t⁴ belong to the radius.
-        let higher = b.norm() * r.norm() + c.norm() * (q.norm() + r.norm());
-        let mixed = self.radius * (other_size + other.radius) + other.radius * size;
-        Self { c: [a * p, a * q + b * p, a * r + b * q + c * p], radius: higher + mixed + ROUNDING * size * other_size }
+        let higher = sizes[1] * other_sizes[2] + sizes[2] * (other_sizes[1] + other_sizes[2]);
+        let mixed = self.radius * (other_whole + other.radius) + other.radius * whole;
+        Self {
+            c: [a * p, a * q + b * p, a * r + b * q + c * p],
+            radius: higher + mixed + ROUNDING * whole * other_whole,
+        }
     }
 }
 
@@ -133,8 +143,7 @@ impl Mul<Complex<f64>> for Jet {
     type Output = Self;
 
     fn mul(self, factor: Complex<f64>) -> Self {
-        let size = factor.norm();
-        Self { c: self.c.map(|c| c * factor), radius: size * (self.radius + ROUNDING * self.polynomial()) }
+        Self { c: self.c.map(|c| c * factor), radius: modulus(factor) * (self.radius + ROUNDING * self.polynomial()) }
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::matrices::Room;
 use super::{Core, ModeMatrices};
-use crate::mechanism::{Cause, Mechanism, Place, ROUNDING, Transition};
+use crate::mechanism::{Mechanism, Place, ROUNDING, Transition};
 use crate::solve::rules::{self, BEGUN, Between, Known, Load, MOMENT, Rules};
 use std::sync::Arc;
 
@@ -143,15 +143,12 @@ impl<const N: usize> Core<N> {
     /// Records bodies at rest whose load equals their breakaway within rounding, if sliding friction is lower;
     /// otherwise the decision makes no difference.
     pub(super) fn note_ties(&mut self) {
+        if self.matrices.breakaways.is_empty() {
+            return;
+        }
         let law = Arc::clone(&self.matrices);
-        for guard in &law.guards {
-            let (body, forward) = match guard.transition.cause {
-                Cause::BreakForward(body) => (body, true),
-                Cause::BreakBackward(body) => (body, false),
-                _ => continue,
-            };
-            let side = self.common.mechanism.friction(body).side(forward);
-            if side.breakaway > side.coulomb && guard.is_zero(&self.z) {
+        for &(index, body) in &law.breakaways {
+            if law.guards[index].is_zero(&self.z) {
                 rules::note_tie(self, body);
             }
         }

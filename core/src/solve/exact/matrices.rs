@@ -4,7 +4,9 @@ mod guards;
 mod shown;
 
 use crate::friction::Motion;
-use crate::mechanism::{BODIES, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, SpringLaw, State};
+use crate::mechanism::{
+    BODIES, Cause, DRIVES, Equations, Form, Layout, Mechanism, Mode, ROUNDING, SPRINGS, SpringLaw, State,
+};
 use crate::signal::DEGREE;
 use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix, SERIES_REACH, Series, series_order};
 use crate::solve::widest::widest;
@@ -196,6 +198,8 @@ fn crude<const N: usize>(mechanism: &Mechanism, layout: &Layout, mode: &Mode, in
 pub(in crate::solve) struct ModeMatrices<const N: usize> {
     pub(super) mode: Mode,
     pub(super) guards: Vec<Watch<N>>,
+    /// Bodies at rest whose breakaway exceeds their Coulomb friction, each with the index of that guard.
+    pub(super) breakaways: Vec<(usize, usize)>,
     /// Guards in groups, for vector instructions.
     beside: Vec<Beside<N>>,
     /// The load on each body without its friction; `None` if a gear with losses changes it at rest.
@@ -337,6 +341,16 @@ impl<const N: usize> ModeMatrices<N> {
             };
             (0..DRIVES).for_each(|drive| beside.at_once[drive][lane] = guard.form.input[drive].abs());
         }
+        let breakaways = guards.iter().enumerate().filter_map(|(index, guard)| {
+            let (body, forward) = match guard.transition.cause {
+                Cause::BreakForward(body) => (body, true),
+                Cause::BreakBackward(body) => (body, false),
+                _ => return None,
+            };
+            let side = mechanism.friction(body).side(forward);
+            (side.breakaway > side.coulomb).then_some((index, body))
+        });
+        let breakaways = breakaways.collect();
         let loses = mechanism.drives.iter().any(|drive| drive.loses());
         let load = (!loses).then(|| {
             let mut load = [Row::NONE; BODIES];
@@ -392,6 +406,7 @@ impl<const N: usize> ModeMatrices<N> {
         Self {
             mode: *mode,
             guards,
+            breakaways,
             beside,
             load,
             forcing,

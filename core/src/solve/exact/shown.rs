@@ -185,8 +185,8 @@ impl<const N: usize> Run<'_, N> {
         let Later { law, begin, interval, wanted, .. } = later;
         let count = wanted.end();
         let bends = self.bends(law, &later.z[0], *interval * count as f64);
-        let [first, second] = [0, 1].map(|end| Sight::new(later.z[end], later.ends[end]));
-        let (mut from, mut to) = (&mut { first }, &mut { second });
+        let (mut first, mut second) = (Sight::new(later.z[0], later.ends[0]), Sight::new(later.z[1], later.ends[1]));
+        let (mut from, mut to) = (&mut first, &mut second);
         for gap in 0..count {
             if gap > 0 {
                 std::mem::swap(&mut from, &mut to);
