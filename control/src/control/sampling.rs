@@ -2,7 +2,7 @@
 
 use super::rest::Rest;
 use super::sampled::{Added, Controller, Loop, SLIDES, Sample};
-use super::stepped::{Clocked, Commands, Decision, References};
+use super::stepped::{Clocked, Commands, Decision};
 use crate::machine::Machine;
 use crate::mechanism::{DRIVES, State};
 use crate::signal::profile::{Profile, Reference};
@@ -13,8 +13,6 @@ pub(super) struct Sampled<'a, 'c> {
     controllers: &'a mut [&'c mut dyn Controller],
     /// Profile of each coordinate.
     profiles: &'a [Profile],
-    /// Weights of the coordinates in the position of each drive along the belt.
-    shares: Vec<&'static [f64]>,
     clocked: Clocked,
     /// Last command of each drive.
     pub(super) told: [Told; DRIVES],
@@ -58,7 +56,6 @@ impl<'a, 'c> Sampled<'a, 'c> {
         Self {
             controllers,
             profiles,
-            shares: machine.belt_shares(),
             clocked: Clocked::new(machine, timing),
             told: [Told::new(f64::INFINITY, f64::INFINITY); DRIVES],
             until: f64::INFINITY,
@@ -124,8 +121,8 @@ impl Sampled<'_, '_> {
         }
     }
 
-    /// References at `time`, s, now and one lead later: of each drive along the belt, and of all slides.
-    fn references(&self, time: f64) -> (References, [[Reference; SLIDES]; 2]) {
+    /// References of all slides at `time`, s, now and one lead later.
+    fn references(&self, time: f64) -> [[Reference; SLIDES]; 2] {
         let lead = self.clocked.timing.lead;
         let at = |time: f64| {
             let mut slides = [Reference::default(); SLIDES];
@@ -134,14 +131,7 @@ impl Sampled<'_, '_> {
         };
         let now = at(time);
         let ahead = if lead == 0.0 { now } else { at(time + lead) };
-        let mut references = References::default();
-        for (weights, of_drive) in self.shares.iter().zip(&mut references) {
-            *of_drive = [&now, &ahead].map(|slides| {
-                let weighed = weights.iter().zip(slides);
-                weighed.fold(Reference::default(), |sum, (weight, slide)| sum.plus(*weight, *slide))
-            });
-        }
-        (references, [now, ahead])
+        [now, ahead]
     }
 
     /// Inputs from now on and the end of their hold, s, from the state and the motors' currents, A, just before.
@@ -149,13 +139,13 @@ impl Sampled<'_, '_> {
         let every = self.clocked.timing.every;
         let (time, before) = (self.clocked.next(), self.clocked.acting());
         // A delayed command needs no reference.
-        let (references, slides) = match self.clocked.is_at_sample() {
+        let slides = match self.clocked.is_at_sample() {
             false => Default::default(),
             true => self.references(time),
         };
         let drives = self.controllers.len();
         let slides = slides.each_ref().map(<[_; SLIDES]>::as_slice);
-        if let Some(decisions) = self.clocked.decide(self.controllers, (state, currents), (&references, slides)) {
+        if let Some(decisions) = self.clocked.decide(self.controllers, (state, currents), slides) {
             self.samples += 1;
             let mut is_limited = false;
             for (drive, Decision { seen, asked, given }) in decisions.into_iter().take(drives).enumerate() {
