@@ -23,10 +23,8 @@ pub use place::Place;
 pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables, Then};
 
 use crate::case::Case;
-use crate::design::FeedForward;
 use crate::error::{Error, Result};
 use crate::linear::{Operation, placed, within_travel};
-use crate::machine::{DriveAt, SlideAt};
 use crate::number::engineering_typed;
 use std::borrow::Cow;
 
@@ -136,18 +134,14 @@ pub(crate) fn identifier(name: &str) -> String {
     }
 }
 
-/// The controller of a case, of a gantry that of each motor. Errors: a case without one, and feed-forward of a gantry;
-/// what to do about it is the caller's to say.
+/// The controller of a case, of a gantry that of each motor. Errors: a case without one; what to do about it is the
+/// caller's to say.
 pub fn controller(case: &Case) -> Result<(&Case, &crate::design::Design)> {
     match &case.controller {
         Some(_) if case.machine.stepper().is_some() => {
             Err(Error::new("a stepper follows its command without a controller"))
         }
-        Some(design) if case.is_axis() || design.feed_forward == FeedForward::NONE => Ok((case, design)),
-        Some(_) => Err(Error::new(
-            "the feed-forward of a gantry needs the references of both bridge and cart, and an exported controller has \
-             only one",
-        )),
+        Some(design) => Ok((case, design)),
         None => Err(Error::new("this case has no controller")),
     }
 }
@@ -156,7 +150,6 @@ pub fn controller(case: &Case) -> Result<(&Case, &crate::design::Design)> {
 fn without_controller(case: &Case, error: Error, instead: &str) -> Error {
     error.next(match case.is_axis() {
         _ if case.machine.stepper().is_some() => instead.to_string(),
-        _ if case.controller.is_some() => format!("leave controller.feed_forward out, or {instead}"),
         true => format!("add a [controller], as in docs/control.md, or {instead}"),
         false => instead.to_string(),
     })
@@ -181,20 +174,9 @@ pub fn part(case: &Case, asked: Option<Part>) -> Result<Part> {
 
 /// Note on the references of controllers of several motors.
 fn drives_note(case: &Case) -> Option<String> {
-    let geometry = case.machine.geometry();
-    let of_drive = |(at, shares): (&DriveAt, &[f64])| {
-        let parts = geometry.slides.iter().zip(shares).filter(|(_, share)| **share != 0.0);
-        let part = |(slide, share): (&SlideAt, &f64)| {
-            format!("{} {}", if *share < 0.0 { "-" } else { "+" }, geometry.label(slide.body).key)
-        };
-        let sum = parts.map(part).collect::<Vec<_>>().join(" ");
-        format!("of the {} {}", at.label.name, sum.trim_start_matches("+ "))
-    };
-    let shares = case.machine.belt_shares();
-    let each: Vec<String> = geometry.drives.iter().zip(shares).map(of_drive).collect();
-    (each.len() > 1).then(|| {
-        format!("one controller for each motor, whose reference is that of its part of the belt: {}", each.join(", "))
-    })
+    let slides = controller::slides(&case.machine);
+    (!slides.is_empty())
+        .then(|| format!("one controller for each motor; each takes the references of {}", slides.join(" and ")))
 }
 
 /// Note that a controller is exported without its input shaper: how many impulses, and what to do.

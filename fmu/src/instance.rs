@@ -318,10 +318,8 @@ impl Instance {
     pub(crate) fn make(&mut self) -> Told<()> {
         let mechanism = self.mechanism()?;
         let state = self.model.state(&mechanism, &self.start);
-        self.control = match (&self.model.design, self.model.stage(&self.parameters)) {
-            (Some(design), Some(stage)) => Some(Stepped::new(design, &stage)?),
-            _ => None,
-        };
+        let design = self.model.design.as_ref();
+        self.control = design.map(|design| Stepped::new(design, &self.model.set(&self.parameters))).transpose()?;
         self.plant = match self.purpose {
             Use::ModelExchange => Plant::Dynamics(Box::new(Dynamics::new(&mechanism, &state)?)),
             Use::CoSimulation { .. } => {
@@ -353,8 +351,8 @@ impl Instance {
                 pieces[drive] = Piece { start: since - self.begin, end: f64::INFINITY, coefficients };
             }
         }
-        if let Some(control) = &self.control {
-            pieces[0] = held(control.command());
+        for (piece, command) in pieces.iter_mut().zip(self.control.iter().flat_map(Stepped::commands)) {
+            *piece = held(*command);
         }
         pieces
     }
@@ -419,7 +417,7 @@ impl Instance {
 
 /// The place of an input among all.
 pub(crate) fn place(model: &Model, role: Role) -> Option<usize> {
-    let first = if model.design.is_some() { REFERENCES } else { model.drives() };
+    let first = if model.design.is_some() { REFERENCES * model.slides() } else { model.drives() };
     match role {
         Role::Input(drive) => Some(drive),
         Role::Reference(k) => Some(k),
@@ -428,8 +426,8 @@ pub(crate) fn place(model: &Model, role: Role) -> Option<usize> {
         Role::Time
         | Role::Parameter(..)
         | Role::Output(_)
-        | Role::Error
-        | Role::Command
+        | Role::Error(_)
+        | Role::Command(_)
         | Role::Quantity(_)
         | Role::Rate(_)
         | Role::Condition(_) => None,

@@ -95,53 +95,56 @@ impl Instance {
 
     /// One decision of the controller.
     fn sample(&mut self) -> Told<()> {
-        let reference = self.referred(Role::Reference);
+        let references = self.referred(Role::Reference);
         let ahead = self.model.lead().map(|_| self.referred(Role::Ahead));
-        self.sees_ahead |= ahead.is_some_and(|ahead| ahead != Reference::default());
+        self.sees_ahead |= ahead.iter().flatten().any(|ahead| *ahead != Reference::default());
         let ahead = ahead.filter(|_| self.sees_ahead);
         let quantities = self.integrated()?;
-        let (state, column) = match &self.plant {
-            Plant::Machine(machine) => {
-                let column = machine.columns().iter().position(|heading| heading.shown == Shown::Current(0));
-                (machine.state(), column)
-            }
-            Plant::Dynamics(dynamics) => {
-                let columns = &dynamics.mechanism().columns;
-                let column = columns.iter().position(|heading| heading.shown == Shown::Current(0));
-                (self.model.state(dynamics.mechanism(), &quantities), column)
-            }
+        let state = match &self.plant {
+            Plant::Machine(machine) => machine.state(),
+            Plant::Dynamics(dynamics) => self.model.state(dynamics.mechanism(), &quantities),
             Plant::None => return Ok(()),
         };
-        let current = self.current(column)?;
+        let currents = self.currents();
         if let Some(control) = &mut self.control {
-            control.decide(&state, current, &reference, ahead.as_ref());
+            control.decide(&state, &currents, &references, ahead.as_deref());
         }
         (self.is_set, self.columns) = (true, None);
         Ok(())
     }
 
-    /// A reference from its five inputs now.
-    fn referred(&self, role: fn(usize) -> Role) -> Reference {
+    /// The reference of each slide from its five inputs now.
+    fn referred(&self, role: fn(usize) -> Role) -> Vec<Reference> {
         let value = |k: usize| place(&self.model, role(k)).map_or(0.0, |place| self.inputs[place].at(self.time));
-        let [position, speed, acceleration, jerk, snap]: [f64; REFERENCES] = std::array::from_fn(value);
-        Reference { position, speed, acceleration, jerk, snap }
+        let of_slide = |slide: usize| {
+            let [position, speed, acceleration, jerk, snap]: [f64; REFERENCES] =
+                std::array::from_fn(|k| value(slide * REFERENCES + k));
+            Reference { position, speed, acceleration, jerk, snap }
+        };
+        (0..self.model.slides()).map(of_slide).collect()
     }
 
-    /// The current of the drive just before inputs that were set act.
-    fn current(&self, column: Option<usize>) -> Told<f64> {
+    /// The current of each drive just before inputs that were set act.
+    fn currents(&self) -> Vec<f64> {
         let mut values = Vec::new();
-        match &self.plant {
+        let columns = match &self.plant {
             Plant::Machine(machine) => {
                 values.resize(machine.columns().len(), 0.0);
                 machine.outputs(&mut values);
+                machine.columns()
             }
             Plant::Dynamics(dynamics) => {
                 values.resize(dynamics.mechanism().columns.len(), 0.0);
                 dynamics.outputs(&mut values);
+                &dynamics.mechanism().columns
             }
-            Plant::None => {}
-        }
-        Ok(column.and_then(|column| values.get(column).copied()).unwrap_or(0.0))
+            Plant::None => return values,
+        };
+        let of_drive = |drive: usize| {
+            let column = columns.iter().position(|heading| heading.shown == Shown::Current(drive));
+            column.and_then(|column| values.get(column).copied()).unwrap_or(0.0)
+        };
+        (0..self.model.drives()).map(of_drive).collect()
     }
 
     /// Moves the machine.

@@ -4,7 +4,7 @@ use crate::instance::{Instance, Phase, Plant, Refusal, Told, place};
 use taut_core::mechanism::{DRIVES, Shown};
 use taut_core::signal::DEGREE;
 use taut_core::solve::{Dynamics, Quantity, Simulator};
-use taut_export::fmu::{Causality, Kind, Role, Variability, Variable};
+use taut_export::fmu::{Causality, Kind, REFERENCES, Role, Variability, Variable};
 
 /// Phases in which values can be read.
 pub(crate) const READ: [Phase; 5] =
@@ -65,13 +65,13 @@ impl Instance {
             }
             Role::Parameter(index, _) => self.parameters[index],
             Role::Output(column) => self.columns()?.get(column).copied().unwrap_or(0.0),
-            Role::Error => {
-                let reference = self.inputs[0].at(self.time);
-                self.load_position()? - reference
+            Role::Error(slide) => {
+                let reference = self.inputs[REFERENCES * slide].at(self.time);
+                self.load_position(slide)? - reference
             }
-            Role::Command => {
+            Role::Command(drive) => {
                 self.prepare()?;
-                self.control.as_ref().map_or(0.0, |control| control.command())
+                self.control.as_ref().map_or(0.0, |control| control.commands()[drive])
             }
             Role::Quantity(index) => self.integrated()?[index],
             Role::Rate(index) => {
@@ -87,10 +87,10 @@ impl Instance {
         })
     }
 
-    /// The position of what the machine is there to move.
-    fn load_position(&mut self) -> Told<f64> {
+    /// The position of a slide.
+    fn load_position(&mut self, slide: usize) -> Told<f64> {
         self.prepare()?;
-        let load = self.model.loads[0];
+        let load = self.model.loads[slide];
         Ok(match &self.plant {
             Plant::Machine(machine) => machine.state().position[load],
             Plant::None | Plant::Dynamics(_) => {
@@ -236,7 +236,7 @@ impl Instance {
             // Of model exchange in event mode, of co-simulation between steps too.
             Role::Parameter(_, tunable) => before || (tunable && self.phase != Phase::Continuous),
             Role::Output(_) | Role::Quantity(_) => before && variable.quantity.is_some(),
-            Role::Time | Role::Error | Role::Command | Role::Rate(_) | Role::Condition(_) => false,
+            Role::Time | Role::Error(_) | Role::Command(_) | Role::Rate(_) | Role::Condition(_) => false,
         };
         match may {
             true => Ok(()),
@@ -300,12 +300,13 @@ impl Instance {
                     "there are no derivatives of outputs: friction or stiffness of this machine is a curve",
                 ));
             }
-            let load = Shown::Position(self.model.loads[0], 1.0);
             let of = |shown: Shown| machine.columns().iter().position(|heading| heading.shown == shown);
             *into = match variable.role {
                 Role::Output(column) => values[column],
-                Role::Error => {
-                    of(load).map_or(0.0, |column| values[column]) - self.inputs[0].derivative(self.time, order)
+                Role::Error(slide) => {
+                    let load = of(Shown::Position(self.model.loads[slide], 1.0));
+                    let reference = self.inputs[REFERENCES * slide].derivative(self.time, order);
+                    load.map_or(0.0, |column| values[column]) - reference
                 }
                 // The controller's command is held, and is no continuous output; nothing else is an output.
                 _ => 0.0,

@@ -28,10 +28,34 @@ fn feed_forward_inside_extrapolates_the_reference_where_none_is_set_ahead() {
 }
 
 fn is_that_of_a_move(name: &str, ahead: bool, most: f64) {
-    let name = format!("sollmann-jouaneh/controllers/{name}.toml");
-    let case = Case::read(machine(&name)).unwrap();
+    is_that_of(&format!("sollmann-jouaneh/controllers/{name}.toml"), &[], ahead, most);
+}
+
+/// The loops of all motors of a gantry, with and without feed-forward and compensated stretch.
+#[test]
+fn the_loops_inside_a_gantry_are_those_of_its_move() {
+    let smooth = "move=[{ name = \"smooth\", points = [[0.04, 0.02], [0.01, 0.035]], speed = 0.3, acceleration = 5, \
+                  jerk = 200, snap = 20000, until = 0.8 }]";
+    let pid = "every = \"1 ms\", limit = \"24 V\", pid = { proportional = 5000, integral = 20000, derivative = 40 }";
+    let cascade = "every = \"1 ms\", delay = \"0.4 ms\", limit = \"24 V\", cascade = { position = 20, speed = 1.5, \
+                   speed_integral = 0.05, current = { proportional = 2, integral = 500, limit = 15 } }";
+    for kind in ["h-frame", "core-xy", "dual-belt"] {
+        for (structure, feed_forward) in [
+            (pid, ""),
+            (pid, ", feed_forward = { model = \"rigid\" }"),
+            (cascade, ", feed_forward = { model = \"elastic\", compensate_stretch = true }"),
+        ] {
+            let controller = format!("controller={{ {structure}{feed_forward} }}");
+            is_that_of(&format!("{kind}/square.toml"), &[smooth, &controller], true, 1e-12);
+        }
+    }
+}
+
+fn is_that_of(name: &str, changes: &[&str], ahead: bool, most: f64) {
+    let case = Case::read_with(machine(name), changes).unwrap();
     let (design, shown) = (case.controller.as_ref().unwrap(), &case.moves[0]);
-    let unit = Unit::of(&name, true);
+    let unit = Unit::with(name, changes, true);
+    let slides: &[&str] = if case.machine.drives.len() == 1 { &[""] } else { &["bridge_", "cart_"] };
     // Into the stroke, before its end, and at rest; steps of a sample, and of a third of one.
     for (milliseconds, parts) in [(30, 1), (80, 3), (600, 1), (600, 3)] {
         let until = f64::from(milliseconds) * 1e-3;
@@ -44,7 +68,8 @@ fn is_that_of_a_move(name: &str, ahead: bool, most: f64) {
             window: shown.window,
             solver: Solver::Exact,
         };
-        let wanted = closed_loop(&setup).unwrap().figures.cart().error.last;
+        let wanted: Vec<f64> = closed_loop(&setup).unwrap().figures.loads.iter().map(|load| load.error.last).collect();
+        assert_eq!(wanted.len(), slides.len());
         let one = unit.three(false, false);
         one.start();
         let put = |name: &str, reference: Reference| {
@@ -55,9 +80,11 @@ fn is_that_of_a_move(name: &str, ahead: bool, most: f64) {
             }
         };
         let refer = |time: f64| {
-            put("reference", shown.profile().at(time));
-            if ahead {
-                put("reference_ahead", shown.profile().at(time + unit.model.lead().unwrap()));
+            for (slide, profile) in slides.iter().zip(&shown.profiles) {
+                put(&format!("{slide}reference"), profile.at(time));
+                if let (Some(lead), true) = (unit.model.lead(), ahead) {
+                    put(&format!("{slide}reference_ahead"), profile.at(time + lead));
+                }
             }
         };
         for k in 0..milliseconds {
@@ -70,7 +97,9 @@ fn is_that_of_a_move(name: &str, ahead: bool, most: f64) {
             }
         }
         refer(until);
-        let is = one.get("error");
-        assert!((is - wanted).abs() <= most, "{name}, {milliseconds} ms: {is} instead of {wanted}");
+        for (slide, wanted) in slides.iter().zip(wanted) {
+            let is = one.get(&format!("{slide}error"));
+            assert!((is - wanted).abs() <= most, "{name} {changes:?}, {milliseconds} ms: {is} instead of {wanted}");
+        }
     }
 }

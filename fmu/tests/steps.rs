@@ -196,12 +196,20 @@ fn a_state_as_bytes_goes_on_bit_for_bit_in_another_instance() {
 /// A state was refused as bytes where a controller was inside: its memory was no plain numbers.
 #[test]
 fn a_state_as_bytes_takes_the_controller_along() {
-    for case in ["pid", "cascade-current", "lqi", "lqg", "fuzzy-pi", "sliding", "pid-observer", "pid-shaped"] {
-        let unit = Unit::of(&format!("sollmann-jouaneh/controllers/{case}.toml"), true);
+    let axes = ["pid", "cascade-current", "lqi", "lqg", "fuzzy-pi", "sliding", "pid-observer", "pid-shaped"]
+        .map(|case| (format!("sollmann-jouaneh/controllers/{case}.toml"), "", ["reference", "command", "error"]));
+    // Commands of several motors under way.
+    let late = "controller={ every = \"1 ms\", delay = \"2.4 ms\", limit = \"24 V\", pid = { proportional = 3000, integral = \
+                20000, derivative = 40 }, feed_forward = { model = \"elastic\", compensate_stretch = true } }";
+    let gantries = ["h-frame", "core-xy", "dual-belt"].map(|kind| (format!("{kind}/square.toml"), late));
+    let gantries = gantries.map(|(case, late)| (case, late, ["cart_reference", "right_command", "cart_error"]));
+    for (case, change, [reference, command, error]) in axes.into_iter().chain(gantries) {
+        let changes = [change];
+        let unit = Unit::with(&case, if change.is_empty() { &[] } else { &changes }, true);
         let (one, two) = (unit.three(false, false), unit.three(false, false));
         one.start();
         two.start();
-        assert_eq!(one.set("reference", 0.01), OK);
+        assert_eq!(one.set(reference, 0.01), OK);
         // Between two samples, and with commands under way.
         one.step(0.0, 0.00373);
         let state = one.keep();
@@ -214,10 +222,10 @@ fn a_state_as_bytes_takes_the_controller_along() {
         }
         two.bring_back(other);
         for instance in [&one, &two] {
-            assert_eq!(instance.set("reference", 0.012), OK);
+            assert_eq!(instance.set(reference, 0.012), OK);
             instance.step(0.00373, 0.05);
         }
-        let [a, b] = [&one, &two].map(|instance| ["cart_position", "command", "error"].map(|name| instance.get(name)));
+        let [a, b] = [&one, &two].map(|instance| ["cart_position", command, error].map(|name| instance.get(name)));
         assert_eq!(a, b, "{case}");
         assert!(a[0] > 1e-3, "{case}: the cart has moved, to {} m", a[0]);
         // With a number of the controller's missing it is none.

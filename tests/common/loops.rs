@@ -75,13 +75,13 @@ impl Loop {
             if machine.scale.is_some() {
                 state.position[CART] = seen[1];
             }
-            stepped.decide(&state, seen[2], &Reference::default(), None);
+            stepped.decide(&state, &[seen[2]], &[Reference::default()], None);
             if rest > 0.0 {
-                stepped.decide(&state, seen[2], &Reference::default(), None);
+                stepped.decide(&state, &[seen[2]], &[Reference::default()], None);
             }
             let mut saved = stepped.save();
             saved.pop();
-            (saved.into_iter().map(f64::from_bits).collect(), stepped.command())
+            (saved.into_iter().map(f64::from_bits).collect(), stepped.commands()[0])
         };
         sample(&mut stepped, [0.0; MEASURED]);
         let (begin, k) = (stepped.save(), stepped.save().len() - 1);
@@ -93,7 +93,7 @@ impl Loop {
                 memory[j] = 1f64.to_bits();
             }
             stepped.restore(&memory).unwrap();
-            let before = stepped.command();
+            let before = stepped.commands()[0];
             let (after, command) = sample(&mut stepped, seen);
             (DVector::from_iterator(own.len(), own.iter().map(|&j| after[j])), command, before)
         };

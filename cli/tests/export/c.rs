@@ -1,6 +1,6 @@
 //! C: compilers, analysers, and the same numbers as taut's, on this machine and on a Cortex-M4F.
 
-use super::machines::{Commands, commands, noisy, observed, observed_drives, pulse, ways};
+use super::machines::{Commands, commands, drawn_gantry, noisy, observed, observed_drives, pulse, ways};
 use super::tools::{are_there, doubles, file, run, taut, write_doubles};
 use nalgebra::Complex;
 use std::f64::consts::PI;
@@ -189,7 +189,7 @@ fn the_controller_replays_moves_bit_for_bit() {
 }
 
 /// Gantries in closed loop, with changes.
-pub const GANTRIES: [(&str, &[&str]); 5] = [
+pub const GANTRIES: [(&str, &[&str]); 7] = [
     ("stages/h-frame/square.toml", &[]),
     ("stages/core-xy/square.toml", &["controller.limit=3 V"]),
     ("stages/dual-belt/square.toml", &[]),
@@ -200,7 +200,16 @@ pub const GANTRIES: [(&str, &[&str]); 5] = [
         ],
     ),
     ("stages/h-frame/square.toml", &["controller.filters=[{ low_pass = \"150 Hz\" }]"]),
+    ("stages/dual-belt/square.toml", &["controller.feed_forward={ model = \"rigid\" }"]),
+    ("stages/core-xy/square.toml", &["controller.feed_forward={ model = \"elastic\", compensate_stretch = true }"]),
 ];
+
+/// Those, and drawn ones with feed-forward.
+pub fn gantries() -> impl Iterator<Item = (String, Vec<String>)> {
+    let owned =
+        |(path, changes): (&str, &[&str])| (path.to_string(), changes.iter().map(ToString::to_string).collect());
+    GANTRIES.into_iter().map(owned).chain((0..24).map(drawn_gantry))
+}
 
 /// Each motor of a gantry has a controller in files of its own.
 #[test]
@@ -208,21 +217,25 @@ fn the_controllers_of_a_gantry_replay_moves_bit_for_bit() {
     if !are_there(&["gcc"]) {
         return;
     }
-    for (path, changes) in GANTRIES {
-        let case = opened(path, changes);
-        let folder = exported(&file(path), changes, &["--part", "controller"]);
+    for (number, (path, changes)) in gantries().enumerate() {
+        let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+        let case = opened(&path, &changes);
+        let folder = exported(&file(&path), &changes, &["--part", "controller"]);
         let harness = fs::read_to_string(folder.path().join("control.c")).unwrap();
         for (side, seen) in case.machine.geometry().sides().zip(observed_drives(&case, 0)) {
             let own = format!("model_{side}");
             let text = harness.replace("model_", &format!("{own}_")).replace("\"model.h\"", &format!("\"{own}.h\""));
             fs::write(folder.path().join("control.c"), text).unwrap();
             fs::copy(folder.path().join(format!("{own}.c")), folder.path().join("model.c")).unwrap();
-            write_doubles(&folder.path().join("in.bin"), seen.iter().flat_map(|(seen, _)| *seen));
-            run_here(folder.path(), "control.c", &[]);
+            write_doubles(&folder.path().join("in.bin"), seen.iter().flat_map(|(seen, _)| seen.iter().copied()));
+            run_here(folder.path(), "control.c", &["-DSLIDES=2"]);
             let given = doubles(&folder.path().join("out.bin"));
             assert_eq!(given.len(), seen.len());
             let first = seen.iter().zip(&given).position(|((_, own), other)| own.to_bits() != other.to_bits());
             assert_eq!(first, None, "{path} {changes:?} {side}");
+            if number == GANTRIES.len() - 1 && are_there(&["cppcheck"]) {
+                misra(folder.path());
+            }
             assert!(seen.iter().any(|(_, given)| *given != 0.0));
         }
     }

@@ -1,12 +1,12 @@
 //! Trajectories and commands that exported machines and controllers are compared with.
 
 use taut::case::Case;
-use taut::control::{Controller, Loop, Observation, Standard, close};
+use taut::control::{Controller, Loop, Observation, Rows, Sample, Standard, stream};
 use taut::export::mechanism;
 use taut::mechanism::State;
 use taut::signal::Signal;
 use taut::signal::profile::Reference;
-use taut::solve::{Simulator, Solver};
+use taut::solve::{Flow, Simulator, Solver};
 
 /// Steps of a run, and how long each is, s.
 pub const STEPS: usize = 1000;
@@ -21,13 +21,18 @@ pub struct Ways {
     pub levers: Vec<f64>,
 }
 
-/// A command that is another one every few steps, zero often enough for bodies to rest: drawn from a seed.
-pub fn commands(drives: usize, size: f64, seed: u64) -> Commands {
+/// Numbers from 0 to 1 that look random.
+fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut number = seed;
-    let mut next = || {
+    move || {
         number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (number >> 11) as f64 / (1_u64 << 53) as f64
-    };
+    }
+}
+
+/// A command that is another one every few steps, zero often enough for bodies to rest: drawn from a seed.
+pub fn commands(drives: usize, size: f64, seed: u64) -> Commands {
+    let mut next = random(seed);
     let mut now = vec![0.0; drives];
     let mut left = 0_usize;
     (0..STEPS)
@@ -88,11 +93,8 @@ const NOISE: [f64; 5] = [1e-9, 0.9e-6, 0.9e-3, 0.0, 0.0];
 pub fn noisy(case: &Case, which: usize, seed: u64) -> Vec<([f64; 12], f64)> {
     let design = case.controller.as_ref().unwrap();
     let mut own = Standard::new(design, &case.machine).unwrap();
-    let mut number = seed;
-    let mut next = || {
-        number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (number >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    };
+    let mut uniform = random(seed);
+    let mut next = || 2.0 * uniform() - 1.0;
     let mut step = |(mut all, _): ([f64; 12], f64)| {
         all.iter_mut().take(10).zip(NOISE.iter().cycle()).for_each(|(value, noise)| *value += noise * next());
         let five = |k: usize| Reference {
@@ -111,20 +113,40 @@ pub fn noisy(case: &Case, which: usize, seed: u64) -> Vec<([f64; 12], f64)> {
     observed(case, which).into_iter().map(&mut step).collect()
 }
 
-/// A controller that is watched: what it saw, and what its limit left.
+/// A controller that is watched: what it was told of all slides, and its measurements.
 struct Watched {
     own: Standard,
-    seen: Vec<(Observation, f64)>,
+    /// References of all slides when the command acts, and their number.
+    ahead: Vec<Reference>,
+    slides: usize,
+    seen: Vec<Seen>,
+}
+
+/// Inputs of a controller: the references of all slides at the sample, then ahead of it, position and current.
+pub type Seen = Vec<f64>;
+
+/// The five numbers of a reference.
+fn five(r: &Reference) -> [f64; 5] {
+    [r.position, r.speed, r.acceleration, r.jerk, r.snap]
 }
 
 impl Controller for Watched {
     fn step(&mut self, seen: &Observation) -> f64 {
-        self.seen.push((*seen, f64::NAN));
+        let ahead = self.ahead.iter().flat_map(five);
+        self.seen.push(ahead.chain([seen.position, seen.current]).collect());
         self.own.step(seen)
     }
 
+    fn forward(&mut self, slides: &[Reference]) -> f64 {
+        self.ahead = slides[..self.slides].to_vec();
+        self.own.forward(slides)
+    }
+
+    fn target(&self, along: Reference, slides: &[Reference]) -> Reference {
+        self.own.target(along, slides)
+    }
+
     fn limited(&mut self, given: f64) {
-        self.seen.last_mut().unwrap().1 = given;
         self.own.limited(given);
     }
 
@@ -135,26 +157,99 @@ impl Controller for Watched {
 
 /// Inputs of the controller of an axis in one of its moves, and the commands that follow: twelve numbers and one.
 pub fn observed(case: &Case, which: usize) -> Vec<([f64; 12], f64)> {
-    observed_drives(case, which).swap_remove(0)
+    let of_axis = observed_drives(case, which).swap_remove(0);
+    of_axis.into_iter().map(|(seen, given)| (seen.try_into().unwrap(), given)).collect()
 }
 
 /// The same of the controller of each drive.
-pub fn observed_drives(case: &Case, which: usize) -> Vec<Vec<([f64; 12], f64)>> {
+pub fn observed_drives(case: &Case, which: usize) -> Vec<Vec<(Seen, f64)>> {
     let design = case.controller.as_ref().unwrap();
     let one = &case.moves[which];
-    let own = Standard::of_drives(design, &case.machine).unwrap();
-    let mut watched: Vec<Watched> = own.into_iter().map(|own| Watched { own, seen: Vec::new() }).collect();
     let profiles = one.references(design);
+    let own = Standard::of_drives(design, &case.machine).unwrap();
+    let watched = |own| Watched { own, ahead: Vec::new(), slides: profiles.len(), seen: Vec::new() };
+    let mut watched: Vec<Watched> = own.into_iter().map(watched).collect();
     let timing = Loop::of(design);
     let mut each: Vec<&mut dyn Controller> = watched.iter_mut().map(|one| one as &mut dyn Controller).collect();
-    close(&case.machine, &mut each, &timing, &profiles, one.until, one.window, Solver::of(&case.machine)).unwrap();
-    let flat = |seen: &Observation| {
-        let five = |r: Reference| [r.position, r.speed, r.acceleration, r.jerk, r.snap];
-        let mut all = [0.0; 12];
-        all[..5].copy_from_slice(&five(seen.reference));
-        all[5..10].copy_from_slice(&five(seen.ahead));
-        (all[10], all[11]) = (seen.position, seen.current);
-        all
+    let rows = Rows { until: one.until, every: design.every, window: one.window };
+    let (solver, sink) = (Solver::of(&case.machine), &mut |_: &_| Flow::Continue);
+    let run = stream(&case.machine, &mut each, &timing, &profiles, &rows, solver, true, sink).unwrap();
+    let of_drive = |(drive, watched): (usize, Watched)| {
+        let samples = run.kept.iter().filter(|sample| sample.drive == drive);
+        let with_given = |(mut seen, sample): (Seen, &Sample)| {
+            let now = profiles.iter().flat_map(|profile| five(&profile.at(sample.time)));
+            seen.splice(0..0, now);
+            (seen, sample.given)
+        };
+        watched.seen.into_iter().zip(samples).map(with_given).collect()
     };
-    watched.iter().map(|one| one.seen.iter().map(|(seen, given)| (flat(seen), *given)).collect()).collect()
+    watched.into_iter().enumerate().map(of_drive).collect()
 }
+
+/// A gantry of any kind with a controller with feed-forward, drawn: its case in `stages` and changes of it.
+pub fn drawn_gantry(number: u64) -> (String, Vec<String>) {
+    let mut next = random(1000 + number);
+    next();
+    let mut between = |low: f64, high: f64| low + (high - low) * next();
+    let (kind, spans) = [("h-frame", 3), ("core-xy", 4), ("dual-belt", 6)][number as usize % 3];
+    let stiffness: Vec<String> = (0..spans).map(|_| between(4e4, 2e5).to_string()).collect();
+    let mut friction = |b: f64, dry: f64| {
+        let mut side = |end: &str| {
+            let (viscous, coulomb) = (b * between(0.01, 1.0), dry * between(0.1, 1.0));
+            format!("viscous{end} = {viscous}, coulomb{end} = {coulomb}")
+        };
+        format!("{{ {}, {} }}", side(""), side("_backward"))
+    };
+    let rubbing = [friction(15.0, 1.0), friction(10.0, 0.6), friction(3e-3, 0.02)];
+    let structure = match between(0.0, 3.0) as usize {
+        0 => "pid = { proportional = 2000, integral = 10000, derivative = 20 }",
+        1 => "cascade = { position = 20, speed = 40, speed_integral = 0.05 }",
+        _ => {
+            "cascade = { position = 20, speed = 1.5, speed_integral = 0.05, \
+             current = { proportional = 2, integral = 500, limit = 15 } }"
+        }
+    };
+    let (model, inertia, friction) =
+        ([FORWARD[0], FORWARD[1], FORWARD[1]][between(0.0, 3.0) as usize], between(0.6, 1.2), between(0.6, 1.2));
+    let shares =
+        if between(0.0, 1.0) < 0.5 { String::new() } else { format!(", inertia = {inertia}, friction = {friction}") };
+    let compensated = between(0.0, 1.0) < 0.5;
+    let mut changes = vec![
+        format!("bridge.mass={}", between(0.2, 2.0)),
+        format!("cart.mass={}", between(0.1, 1.0)),
+        format!("bridge.friction={}", rubbing[0]),
+        format!("cart.friction={}", rubbing[1]),
+        format!("drive_pulley.friction={}", rubbing[2]),
+        format!("right_drive.motor.resistance={}", between(0.4, 1.0)),
+        format!("motor.rotor_inertia={}", between(1e-6, 1e-5)),
+        format!(
+            "controller={{ every = 1e-3, delay = {}, limit = 20, {structure}, \
+             feed_forward = {{ model = \"{model}\"{shares}, compensate_stretch = {compensated} }} }}",
+            between(0.0, 2e-3),
+        ),
+        "move=[{ name = \"smooth\", points = [[0.04, 0.02], [0.01, 0.035]], speed = 0.3, acceleration = 5, jerk = 200, \
+         snap = 20000, until = 0.8 }]"
+            .into(),
+    ];
+    match number % 4 {
+        // Spans that follow the slides.
+        0 => changes.push(format!(
+            "belt={{ modulus = 8e9, section = 1e-5, spans = {:?}, follows_cart = true }}",
+            vec![between(0.8, 1.6); spans]
+        )),
+        _ => changes.push(format!("belt.stiffness=[{}]", stiffness.join(", "))),
+    }
+    // Gears with a loss, or compliant ones, which a dual belt does not have.
+    match number % 5 {
+        1 => changes.extend(["motor.gear_ratio=2".into(), "motor.gear_efficiency=0.8".into()]),
+        2 if kind != "dual-belt" => {
+            changes.extend(["motor.gear_stiffness=400".into(), "motor.gear_damping=0.05".into()])
+        }
+        3 => changes.push("motor.inductance=2e-4".into()),
+        _ => {}
+    }
+    (format!("stages/{kind}/square.toml"), changes)
+}
+
+/// Models of feed-forward.
+const FORWARD: [&str; 2] = ["rigid", "elastic"];

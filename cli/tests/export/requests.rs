@@ -23,7 +23,7 @@ fn without_a_name_it_lists_what_there_is() {
 fn wrong_requests_are_refused_with_what_can_be_done_instead() {
     let (table4, pid) =
         (file("stages/sollmann-jouaneh/table4.toml"), file("stages/sollmann-jouaneh/controllers/pid.toml"));
-    let (core, square) = (file("stages/core-xy/core-xy.toml"), file("stages/core-xy/square.toml"));
+    let core = file("stages/core-xy/core-xy.toml");
     let curved =
         ["--set", "cart.friction={ coulomb = \"0.2 N\", stribeck = { force = \"0.1 N\", velocity = \"0.02 m/s\" } }"];
     let mut words = vec!["export", "c", &table4];
@@ -35,17 +35,13 @@ fn wrong_requests_are_refused_with_what_can_be_done_instead() {
     words[2] = &pid;
     let (_, _, error) = told(&words);
     assert!(error.contains("taut export fmu") && error.contains("--part controller"), "{error}");
-    let cases: [(&[&str], &[&str]); 12] = [
+    let cases: [(&[&str], &[&str]); 11] = [
         (&["export", "c", &table4, "--at", "1 mm"], &["--at: spans of this belt do not follow", "leave it out"]),
         (&["export", "c", &table4, "--bridge", "1 mm"], &["--bridge: this machine has no bridge"]),
         (&["export", "st", &pid, "--at", "1 mm"], &["--at means nothing to st", "c, matlab and python"]),
         (&["export", "c", &table4, "--part", "controller"], &["no controller", "[controller]", "leave --part out"]),
         (&["export", "st", &table4], &["no controller", "[controller]", "export fmu"]),
         (&["export", "c", &core, "--part", "both"], &["this case has no controller", "leave --part out"]),
-        (
-            &["export", "c", &square, "--part", "both", "--set", "controller.feed_forward={ model = \"rigid\" }"],
-            &["feed-forward of a gantry", "leave controller.feed_forward out, or leave --part out"],
-        ),
         (&["export", "st", &pid, "--part", "plant"], &["only a controller", "export fmu"]),
         (&["export", "st", &pid, "--real", "float"], &["--real means nothing to st", "with c"]),
         (&["export", "c", &table4, "--fmi", "2"], &["--fmi means nothing to c", "with fmu"]),
@@ -175,12 +171,9 @@ fn spans_that_follow_the_cart_are_held_where_it_is_said() {
     };
     for name in ["stage", "printer-servo", "gantry"] {
         let case = format!("{name}.toml");
-        // The loop of a gantry has feed-forward, which no exported controller has.
-        let part: &[&str] = if name == "gantry" { &["--part", "plant"] } else { &[] };
         for target in ["c", "matlab", "python"] {
-            let part = if target == "c" { part } else { &[] };
             let out = format!("{name}-{target}");
-            let (code, shown, error) = exported(&[&[target, &case, "--out", &out, "--at", "50 mm"], part].concat());
+            let (code, shown, error) = exported(&[target, &case, "--out", &out, "--at", "50 mm"]);
             assert_eq!(code, Some(0), "{name}, {target}: {error}");
             let words = shown.split_whitespace().collect::<Vec<_>>().join(" ");
             assert!(words.contains("the cart at 50 mm: --at names another place"), "{name}, {target}: {shown}");

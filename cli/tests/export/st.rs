@@ -6,21 +6,14 @@ use super::tools::{file, python, run, taut};
 use std::fs;
 use taut::case::Case;
 
-/// Inputs of a block, in the order of what a controller sees.
-pub const SEEN: [&str; 12] = [
-    "now_position",
-    "now_speed",
-    "now_acceleration",
-    "now_jerk",
-    "now_snap",
-    "ahead_position",
-    "ahead_speed",
-    "ahead_acceleration",
-    "ahead_jerk",
-    "ahead_snap",
-    "measured",
-    "current",
-];
+/// Inputs of a block, in the order of what a controller sees: of an axis the slide is called "", of a gantry "bridge_"
+/// and "cart_".
+fn names(slides: &[&str]) -> Vec<String> {
+    let derivatives = ["position", "speed", "acceleration", "jerk", "snap"];
+    let of = ["now_", "ahead_"].into_iter().flat_map(|of| slides.iter().map(move |slide| format!("{of}{slide}")));
+    let references = of.flat_map(|of| derivatives.map(|derivative| format!("{of}{derivative}")));
+    references.chain(["measured", "current"].map(String::from)).collect()
+}
 
 fn exported(name: &str) -> String {
     changed(name, &[])
@@ -35,18 +28,24 @@ fn changed(name: &str, changes: &[&str]) -> String {
     fs::read_to_string(folder.path().join("x.st")).unwrap()
 }
 
-/// The commands of a block that is called with what a controller saw.
+/// The commands of the block of an axis that is called with what a controller saw.
 pub fn replayed(text: &str, seen: &[([f64; 12], f64)]) -> Vec<f64> {
-    let mut block = Block::new(text);
+    commands(text, &[""], seen.iter().map(|(seen, _)| &seen[..]))
+}
+
+/// The commands of a block that takes the references of these slides.
+fn commands<'s>(text: &str, slides: &[&str], seen: impl Iterator<Item = &'s [f64]>) -> Vec<f64> {
+    let (mut block, names) = (Block::new(text), names(slides));
     assert!(block.name.ends_with("_CONTROLLER"), "{}", block.name);
-    let step = |(seen, _): &([f64; 12], f64)| {
-        for (name, value) in SEEN.iter().zip(seen).filter(|(name, _)| block.has(name)).collect::<Vec<_>>() {
+    let step = |seen: &[f64]| {
+        assert_eq!(seen.len(), names.len());
+        for (name, value) in names.iter().zip(seen).filter(|(name, _)| block.has(name)).collect::<Vec<_>>() {
             block.set(name, *value);
         }
         block.call();
         block.get("command")
     };
-    seen.iter().map(step).collect()
+    seen.map(step).collect()
 }
 
 #[test]
@@ -66,14 +65,18 @@ fn function_blocks_replay_moves_bit_for_bit() {
     }
 }
 
-/// One function block, an instance of it for each motor.
+/// A function block for each motor, in one file.
 #[test]
 fn a_function_block_is_the_controller_of_each_motor_of_a_gantry() {
-    for (path, changes) in super::c::GANTRIES {
-        let case = Case::read_with(file(path), changes).unwrap();
-        let text = changed(&file(path), changes);
-        for seen in observed_drives(&case, 0) {
-            let given = replayed(&text, &seen);
+    for (path, changes) in super::c::gantries() {
+        let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
+        let case = Case::read_with(file(&path), &changes).unwrap();
+        let text = changed(&file(&path), &changes);
+        let blocks: Vec<&str> = text.split_inclusive("END_FUNCTION_BLOCK\n").collect();
+        assert_eq!(blocks.len(), case.machine.drives.len());
+        for ((side, block), seen) in case.machine.geometry().sides().zip(blocks).zip(observed_drives(&case, 0)) {
+            assert!(block.contains(&format!("FUNCTION_BLOCK x_{side}_controller")), "{side}");
+            let given = commands(block, &["bridge_", "cart_"], seen.iter().map(|(seen, _)| &seen[..]));
             let first = seen.iter().zip(&given).position(|((_, own), other)| own.to_bits() != other.to_bits());
             assert_eq!(first, None, "{path} {changes:?}");
         }
@@ -104,10 +107,13 @@ fn a_public_grammar_takes_every_block() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("grammar.py"), GRAMMAR).unwrap();
     let mut words = vec!["grammar.py".to_string()];
-    for name in super::c::CONTROLLERS {
-        let text = exported(&file(&format!("stages/sollmann-jouaneh/controllers/{name}.toml")));
-        fs::write(folder.path().join(format!("{name}.st")), text).unwrap();
-        words.push(format!("{name}.st"));
+    let controllers =
+        super::c::CONTROLLERS.iter().map(|name| format!("stages/sollmann-jouaneh/controllers/{name}.toml"));
+    let axes = controllers.map(|path| (path, Vec::new()));
+    for (number, (path, changes)) in axes.chain(super::c::gantries().take(super::c::GANTRIES.len())).enumerate() {
+        let text = changed(&file(&path), &changes.iter().map(String::as_str).collect::<Vec<_>>());
+        fs::write(folder.path().join(format!("{number}.st")), text).unwrap();
+        words.push(format!("{number}.st"));
     }
     run(folder.path(), python, &words.iter().map(String::as_str).collect::<Vec<_>>());
 }

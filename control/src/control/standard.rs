@@ -5,7 +5,7 @@ use super::law::{Law, Seen};
 use super::laws::AnyLaw;
 use super::observer::DisturbanceObserver;
 use super::sampled::{Controller, Observation};
-use crate::calculator::{Calculator, Run, Slot, Slots, less, more};
+use crate::calculator::{Calculator, Run, Slot, Slots};
 use crate::design::{Design, FeedForward, Structure};
 use crate::error::{Error, Result};
 use crate::machine::rigid::Rigid;
@@ -19,8 +19,7 @@ use crate::signal::profile::Reference;
 pub struct Standard {
     text: Text,
     memory: Vec<f64>,
-    /// Feed-forward of one of several drives; and its part for the current loop, A, until the next step.
-    forward: Option<Forward>,
+    /// Feed-forward for the current loop of one of several drives, A, until the next step.
     inner: Option<f64>,
 }
 
@@ -29,6 +28,8 @@ pub struct Standard {
 pub struct Text {
     pub(crate) law: AnyLaw,
     compensation: Compensation,
+    /// Feed-forward of one of several drives.
+    forward: Option<Forward>,
     observer: Option<DisturbanceObserver>,
     pub(crate) filters: Vec<Biquad>,
     /// Weights of encoder and scale in the position for the observer.
@@ -42,6 +43,11 @@ pub struct Text {
 }
 
 impl Text {
+    /// Controller of a drive of `model` by `design`, with its share of a joint feed-forward if there are several drives.
+    pub fn of_drive(design: &Design, model: &Machine, drive: usize) -> Result<Self> {
+        Ok(Self { forward: Forward::of(design.feed_forward, model, drive), ..Self::new(design, model)? })
+    }
+
     /// Controller of `design` for a `model` of the axis.
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         check(design, model)?;
@@ -69,7 +75,8 @@ impl Text {
         ]
         .map(|(name, about)| slots.add(name, about));
         let weights = observed(model, &rigid);
-        Ok(Self { law, compensation, observer, filters, weights, slots: std::mem::take(slots), asked, position, dry })
+        let (forward, slots) = (None, std::mem::take(slots));
+        Ok(Self { law, compensation, forward, observer, filters, weights, slots, asked, position, dry })
     }
 
     /// The command before the limit.
@@ -77,8 +84,31 @@ impl Text {
         self.step_with(c, seen, None)
     }
 
+    /// Feed-forward of one of several drives from the references of all slides when the command acts: what is added to
+    /// the command, V or A, and the part for the current loop, A, if the law has one.
+    pub fn forward<C: Calculator>(&self, c: &mut C, slides: &[Reference<C::N>]) -> [Option<C::N>; 2] {
+        match &self.forward {
+            Some(forward) if self.law.commands_current() => match forward.split(c, slides) {
+                Some([inner, outside]) => [Some(outside), Some(inner)],
+                None => [None; 2],
+            },
+            Some(forward) => [forward.command(c, slides), None],
+            None => [None; 2],
+        }
+    }
+
+    /// The reference of the encoder of one of several drives, from that of its part of the belt and those of all slides.
+    pub fn target<C: Calculator>(
+        &self,
+        c: &mut C,
+        along: Reference<C::N>,
+        slides: &[Reference<C::N>],
+    ) -> Reference<C::N> {
+        self.forward.as_ref().map_or(along, |forward| forward.target(c, along, slides))
+    }
+
     /// The command before the limit, with this feed-forward for the current loop, A, from outside.
-    fn step_with<C: Calculator>(&self, c: &mut C, seen: &Observation<C::N>, inner: Option<C::N>) -> C::N {
+    pub fn step_with<C: Calculator>(&self, c: &mut C, seen: &Observation<C::N>, inner: Option<C::N>) -> C::N {
         let compensation = &self.compensation;
         c.remark("where the encoder should be, and what the reference asks for by itself");
         let target = compensation.target(c, &seen.reference);
@@ -86,7 +116,8 @@ impl Text {
         let mut forward = inner;
         if let (Some(whole), true) = (added, self.law.commands_current()) {
             // A current for the inner loop; the rest of the voltage is added outside.
-            (forward, added) = split(c, compensation, &seen.ahead, whole);
+            let [inner, outside] = compensation.rigid.split(c, seen.ahead.speed, whole);
+            (forward, added) = (Some(inner), Some(outside));
         }
         c.remark(self.law.about());
         let &Observation { reference, position, scale, current, .. } = seen;
@@ -138,36 +169,20 @@ impl Text {
     }
 }
 
-/// The part of a feed-forward voltage for the current loop, A; and the rest for the back-EMF, V.
-fn split<C: Calculator>(
-    c: &mut C,
-    compensation: &Compensation,
-    ahead: &Reference<C::N>,
-    forward: C::N,
-) -> (Option<C::N>, Option<C::N>) {
-    let (rigid, zero) = (&compensation.rigid, c.number(0.0));
-    let steady = Reference { position: zero, acceleration: zero, jerk: zero, snap: zero, ..*ahead };
-    let back = rigid.command_by(c, zero, zero, &steady);
-    // Zero feed-forward has no part for the speed.
-    let nothing = c.choose(less(forward, 0.0), back, zero);
-    let back = c.choose(more(forward, 0.0), back, nothing);
-    let back = c.name("back_emf", back);
-    let inner = (forward - back) * rigid.amperes_per_command();
-    (Some(c.name("inner", inner)), Some(back))
-}
-
 impl Standard {
     /// The controller of `design` for a `model` of the axis.
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         let text = Text::new(design, model)?;
-        Ok(Self { memory: vec![0.0; text.slots.count()], text, forward: None, inner: None })
+        Ok(Self::of(text))
+    }
+
+    fn of(text: Text) -> Self {
+        Self { memory: vec![0.0; text.slots.count()], text, inner: None }
     }
 
     /// A controller for each drive of a machine.
     pub fn of_drives(design: &Design, model: &Machine) -> Result<Vec<Self>> {
-        let of_drive =
-            |drive| Ok(Self { forward: Forward::of(design.feed_forward, model, drive), ..Self::new(design, model)? });
-        (0..model.drives.len()).map(of_drive).collect()
+        (0..model.drives.len()).map(|drive| Text::of_drive(design, model, drive).map(Self::of)).collect()
     }
 
     /// Memory from sample to sample.
@@ -186,17 +201,13 @@ impl Controller for Standard {
     }
 
     fn forward(&mut self, slides: &[Reference]) -> f64 {
-        let Some(forward) = &self.forward else { return 0.0 };
-        if !self.text.law.commands_current() {
-            return forward.command(slides);
-        }
-        let (inner, outside) = forward.split(slides);
-        self.inner = Some(inner);
-        outside
+        let [outside, inner] = self.text.forward(&mut Run::plain(), slides);
+        self.inner = inner;
+        outside.unwrap_or(0.0)
     }
 
     fn target(&self, along: Reference, slides: &[Reference]) -> Reference {
-        self.forward.as_ref().map_or(along, |forward| forward.target(along, slides))
+        self.text.target(&mut Run::plain(), along, slides)
     }
 
     fn limited(&mut self, given: f64) {

@@ -1,7 +1,8 @@
-//! A controller stepped from outside: the caller provides the reference, and the state of the machine at its samples.
+//! Controllers stepped from outside: the caller provides the references, and the state of the machine at their samples.
 
 use super::sampled::{Controller, Loop, Observation, SLIDES, Sensors};
 use super::standard::Standard;
+use crate::calculator::Run;
 use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
@@ -15,9 +16,8 @@ use std::collections::VecDeque;
 pub(super) struct Clocked {
     pub timing: Loop,
     clock: Interval,
-    /// Sensors of each drive.
+    /// Sensors of each drive, and the weights of the slides in its position along the belt.
     sensors: Vec<Sensors>,
-    /// Weights of the slides in the position of each drive along the belt.
     shares: Vec<&'static [f64]>,
     /// Next sample, and the next decision in it: the sample itself, or the start of a delayed command.
     k: u64,
@@ -103,8 +103,9 @@ impl Clocked {
         let mut decisions = [Decision::default(); DRIVES];
         let mut given = [0.0; DRIVES];
         for (drive, controller) in controllers.iter_mut().enumerate() {
-            let sensors = &self.sensors[drive];
-            let [reference, ahead] = [&slides, &later].map(|slides| along(self.shares[drive], slides));
+            let (sensors, shares) = (&self.sensors[drive], self.shares[drive]);
+            let weighed = |all: &[Reference; SLIDES]| Reference::weighed(&mut Run::plain(), shares, all);
+            let [reference, ahead] = [&slides, &later].map(weighed);
             let forward = controller.forward(&later);
             let seen = Observation {
                 time,
@@ -131,25 +132,20 @@ impl Clocked {
     }
 }
 
-/// The reference of a drive's part of the belt, from those of the slides.
-fn along(weights: &[f64], slides: &[Reference; SLIDES]) -> Reference {
-    weights.iter().zip(slides).fold(Reference::default(), |sum, (weight, slide)| sum.plus(*weight, *slide))
-}
-
-/// The controller of an axis with its clock, its delay and its limit, between two of its decisions. A clone continues
-/// identically.
+/// The controllers of all drives of a machine with their clock, delay and limit, between two of their decisions. A clone
+/// continues identically.
 #[derive(Debug, Clone)]
 pub struct Stepped {
-    controller: Standard,
+    controllers: Vec<Standard>,
     clocked: Clocked,
 }
 
 impl Stepped {
-    /// The controller of `design` on `machine`, its first sample at time zero.
+    /// The controllers of `design` on `machine`, their first sample at time zero.
     pub fn new(design: &Design, machine: &Machine) -> Result<Self> {
         let timing = Loop::of(design);
         timing.check(timing.every)?;
-        Ok(Self { controller: Standard::new(design, machine)?, clocked: Clocked::new(machine, timing) })
+        Ok(Self { controllers: Standard::of_drives(design, machine)?, clocked: Clocked::new(machine, timing) })
     }
 
     /// Time of the next decision, s.
@@ -157,42 +153,45 @@ impl Stepped {
         self.clocked.next()
     }
 
-    /// The command that acts now, V or A.
-    pub fn command(&self) -> f64 {
-        self.clocked.acting()[0]
+    /// The command of each drive that acts now, V or A.
+    pub fn commands(&self) -> &[f64] {
+        &self.clocked.acting[..self.controllers.len()]
     }
 
-    /// Decides at [`Stepped::next`] from the state, the motor's current, A, and the reference at that time.
+    /// Decides at [`Stepped::next`] from the state, the current of each motor, A, and the references of all slides at
+    /// that time.
     ///
-    /// `ahead` is the reference one lead later ([`Loop::lead`]). Without it the reference is extrapolated by its
-    /// derivatives with constant snap, which is wrong where the snap of a profile jumps within the lead. The command
-    /// acts until the next decision.
-    pub fn decide(&mut self, state: &State, current: f64, reference: &Reference, ahead: Option<&Reference>) -> f64 {
-        let ahead = ahead.copied().unwrap_or_else(|| after(reference, self.clocked.timing.lead));
-        let mut currents = Commands::default();
-        currents[0] = current;
-        let references = [*reference, ahead].map(|reference| {
-            let mut slides = [Reference::default(); SLIDES];
-            slides[0] = reference;
-            slides
-        });
-        self.clocked.decide(&mut [&mut self.controller], (state, &currents), |_| references);
-        self.command()
+    /// `ahead` are the references one lead later ([`Loop::lead`]). Without them they are extrapolated by their
+    /// derivatives with constant snap, which is wrong where the snap of a profile jumps within the lead. The commands
+    /// act until the next decision.
+    pub fn decide(&mut self, state: &State, currents: &[f64], slides: &[Reference], ahead: Option<&[Reference]>) {
+        let lead = self.clocked.timing.lead;
+        let mut references = [[Reference::default(); SLIDES]; 2];
+        for (number, slide) in slides.iter().enumerate().take(SLIDES) {
+            references[0][number] = *slide;
+            references[1][number] =
+                ahead.and_then(|ahead| ahead.get(number).copied()).unwrap_or_else(|| after(slide, lead));
+        }
+        let mut of_drives = Commands::default();
+        of_drives.iter_mut().zip(currents).for_each(|(own, current)| *own = *current);
+        let mut all: Vec<&mut dyn Controller> = self.controllers.iter_mut().map(|one| one as _).collect();
+        self.clocked.decide(&mut all, (state, &of_drives), |_| references);
     }
 }
 
 impl Stepped {
     /// Its complete state as plain numbers: whether a delayed command is due within the sample, pending and acting
-    /// commands, the memory of its law, and the sample number.
+    /// commands, the memory of each law, and the sample number.
     pub fn save(&self) -> Vec<u64> {
         let Clocked { k, halfway, waiting, acting, .. } = &self.clocked;
-        let halfway = f64::from(u8::from(*halfway));
-        let numbers = [halfway].into_iter().chain(waiting.iter().chain([acting]).map(|commands| commands[0]));
-        numbers.chain(self.controller.memory().iter().copied()).map(f64::to_bits).chain([*k]).collect()
+        let (halfway, drives) = (f64::from(u8::from(*halfway)), self.controllers.len());
+        let commands = waiting.iter().chain([acting]).flat_map(|commands| &commands[..drives]);
+        let memory = self.controllers.iter().flat_map(Standard::memory);
+        [halfway].iter().chain(commands).chain(memory).map(|number| number.to_bits()).chain([*k]).collect()
     }
 
-    /// Continues bit for bit from the result of [`Stepped::save`] of a controller of the same design. Returns `None`,
-    /// and changes nothing, if `saved` does not belong to one.
+    /// Continues bit for bit from the result of [`Stepped::save`] of controllers of the same design. Returns `None`,
+    /// and changes nothing, if `saved` does not belong to them.
     pub fn restore(&mut self, saved: &[u64]) -> Option<()> {
         let (k, numbers) = saved.split_last()?;
         let (halfway, numbers) = numbers.split_first()?;
@@ -201,17 +200,23 @@ impl Stepped {
             1.0 => true,
             _ => return None,
         };
+        let drives = self.controllers.len();
         // Between a sample and the start of its command, that command waits with the others.
         let waiting = self.clocked.timing.samples_late().0 + usize::from(halfway);
-        let memory = self.controller.memory_mut();
-        if numbers.len() != waiting + 1 + memory.len() {
+        let memory: usize = self.controllers.iter().map(|one| one.memory().len()).sum();
+        if numbers.len() != (waiting + 1) * drives + memory {
             return None;
         }
         let mut numbers = numbers.iter().map(|bits| f64::from_bits(*bits));
-        let commands = |command: f64| std::array::from_fn(|drive| if drive == 0 { command } else { 0.0 });
-        self.clocked.waiting = numbers.by_ref().take(waiting).map(commands).collect();
-        self.clocked.acting = commands(numbers.next()?);
-        memory.iter_mut().zip(numbers).for_each(|(number, saved)| *number = saved);
+        let mut commands = || {
+            let mut commands = Commands::default();
+            commands[..drives].fill_with(|| numbers.next().unwrap_or_default());
+            commands
+        };
+        self.clocked.waiting = (0..waiting).map(|_| commands()).collect();
+        self.clocked.acting = commands();
+        let memory = self.controllers.iter_mut().flat_map(Standard::memory_mut);
+        memory.zip(numbers).for_each(|(number, saved)| *number = saved);
         (self.clocked.k, self.clocked.halfway) = (*k, halfway);
         Some(())
     }

@@ -205,6 +205,19 @@ impl Rigid {
         }
     }
 
+    /// A feed-forward command at this speed of the drive pulley in two parts: a current for a current loop, A, and the
+    /// voltage outside for the back-EMF, V. A command of zero has no parts.
+    pub fn split<C: Calculator>(&self, c: &mut C, speed: C::N, command: C::N) -> [C::N; 2] {
+        let zero = c.number(0.0);
+        let steady = Reference { position: zero, speed, acceleration: zero, jerk: zero, snap: zero };
+        let back = self.command_by(c, zero, zero, &steady);
+        let nothing = c.choose(less(command, 0.0), back, zero);
+        let back = c.choose(more(command, 0.0), back, nothing);
+        let back = c.name("back_emf", back);
+        let inner = (command - back) * self.amperes_per_command();
+        [c.name("inner", inner), back]
+    }
+
     /// Force per command at rest, N/V or N/A.
     pub fn force_per_command(&self) -> f64 {
         1.0 / self.command(1.0, 0.0, &Reference::default())

@@ -32,6 +32,7 @@ pub use power::Power;
 pub use ride::{Ridden, Ride, RideLaw, Riding};
 pub use transition::{After, Next, Place, Resets, Then, Transition};
 
+use crate::calculator::{Calculator, Run};
 use crate::friction::Friction;
 use crate::polyline::Polyline;
 use std::borrow::Cow;
@@ -201,8 +202,14 @@ pub struct Follows {
 impl Follows {
     /// k = E A / l                                                                  (11)
     pub fn stiffness(&self, position: impl Fn(usize) -> f64) -> f64 {
-        let change: f64 = self.arms.iter().map(|&(body, arm)| arm * position(body)).sum();
-        self.rigidity / (self.length + change)
+        self.stiffness_by(&mut Run::plain(), |body| Some(position(body)))
+    }
+
+    /// As [`Follows::stiffness`], for any calculator; bodies without a position are at zero.
+    pub(crate) fn stiffness_by<C: Calculator>(&self, c: &mut C, position: impl Fn(usize) -> Option<C::N>) -> C::N {
+        let change = self.arms.iter().filter_map(|&(body, arm)| Some(position(body)? * arm)).reduce(|sum, of| sum + of);
+        let (rigidity, length) = (c.number(self.rigidity), c.number(self.length));
+        rigidity / change.map_or(length, |change| length + change)
     }
 }
 

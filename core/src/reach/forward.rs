@@ -1,13 +1,13 @@
 //! Feed-forward for each drive of a machine with several, from the references of all sliding parts.
 
-use super::compensation::{direction, twist};
+use super::compensation::{direction_by, twist};
+use crate::calculator::{Calculator, Number, Run};
 use crate::design::{FeedForward, FeedForwardModel};
 use crate::machine::rigid::Rigid;
 use crate::machine::{EncoderPlace, Machine};
-use crate::mechanism::{GearPlay, Spring};
+use crate::mechanism::{Follows, GearPlay, Spring};
 use crate::polyline::Polyline;
 use crate::signal::profile::Reference;
-use nalgebra::{DMatrix, DVector};
 
 /// Feed-forward of one drive, and the reference of its encoder.
 #[derive(Debug, Clone)]
@@ -35,22 +35,31 @@ struct Slide {
     along: Option<Polyline>,
 }
 
-/// The spans of a belt around a drive pulley and the slides.
+/// The spans of a belt around a drive pulley and both slides of a gantry.
 #[derive(Debug, Clone)]
 struct Belt {
-    spans: Vec<Spring>,
-    /// Elongation of each span per displacement of each slide, and per displacement of the belt at the drive pulley.
-    slides: DMatrix<f64>,
-    drive: DVector<f64>,
+    spans: Vec<Span>,
     /// Bodies of the slides.
-    bodies: Vec<usize>,
+    bodies: [usize; 2],
+}
+
+/// A span of it.
+#[derive(Debug, Clone)]
+struct Span {
+    /// Elongation per displacement of each slide: its row of A_q.
+    slides: [f64; 2],
+    /// Elongation per displacement of the belt at the drive pulley: a_φ.
+    drive: f64,
+    /// N/m, if it follows no slide.
+    stiffness: f64,
+    follows: Option<Follows>,
 }
 
 /// Motion of the belt at the drive pulley, and the motor force there.
-struct Needed {
-    drive: Reference,
+struct Needed<N> {
+    drive: Reference<N>,
     /// N; and its rate, N/s.
-    force: [f64; 2],
+    force: [N; 2],
 }
 
 impl Forward {
@@ -82,40 +91,52 @@ impl Forward {
     }
 
     /// The reference of its part of the belt, without stretch.
-    pub fn along(&self, slides: &[Reference]) -> Reference {
-        let shares = self.slides.iter().zip(slides);
-        shares.fold(Reference::default(), |sum, (slide, reference)| sum.plus(slide.share, *reference))
+    pub fn along<C: Calculator>(&self, c: &mut C, slides: &[Reference<C::N>]) -> Reference<C::N> {
+        let shares: Vec<f64> = self.slides.iter().map(|slide| slide.share).collect();
+        Reference::weighed(c, &shares, slides)
     }
 
     /// The reference of its encoder, for which the slides follow theirs, from that of its part of the belt.
-    pub fn target(&self, along: Reference, slides: &[Reference]) -> Reference {
+    pub fn target<C: Calculator>(
+        &self,
+        c: &mut C,
+        along: Reference<C::N>,
+        slides: &[Reference<C::N>],
+    ) -> Reference<C::N> {
         let Some(belt) = self.belt.as_ref().filter(|_| self.settings.compensate_stretch) else { return along };
-        let Needed { drive: mut target, force } = self.stretched(belt, slides);
+        let Needed { drive: mut target, force } = self.stretched(c, belt, slides);
         if let Some(gear) = self.gear {
             // The rotor's own torque does not pass through the gear.
-            let torque = self.radius * (force[0] - self.pulley.rotor * target.acceleration);
-            target.position += self.radius * twist(&gear, torque, direction(&along));
+            let torque = (force[0] - target.acceleration * self.pulley.rotor) * self.radius;
+            let way = direction_by(c, &along);
+            target.position = c.name("target", target.position + twist(&gear, torque, way) * self.radius);
         }
         target
     }
 
-    /// Motor force at the belt, N, and the rate of its inertial part, N/s.
+    /// Motor force at the belt, N, and the rate of its inertial part, N/s, with these factors on inertia and friction.
     ///
     /// The motors do the work of the forces on the slides: Σ_k f_k r dφ_k = Σ_s F_s dq_s with q_s = Σ_k w_sk r φ_k, so
     /// that f_k = Σ_s w_sk F_s, and each also accelerates its own pulley. Dry friction follows the direction of the
     /// rubbing part: of r φ for pulleys, of x and y for bridge and cart.
-    pub fn force(&self, slides: &[Reference]) -> [f64; 2] {
-        self.share_of_force(slides, [self.settings.inertia, self.settings.friction])
-    }
-
-    /// As [`Forward::force`], with these factors on inertia and friction.
-    fn share_of_force(&self, slides: &[Reference], shares: [f64; 2]) -> [f64; 2] {
-        let [mut force, mut rate] = of_part(&self.pulley, &self.along(slides), shares);
-        for (slide, reference) in self.slides.iter().zip(slides) {
-            let [push, change] = slide.push(reference, shares);
-            (force, rate) = (force + slide.lever * push, rate + slide.lever * change);
+    fn share_of_force<C: Calculator>(&self, c: &mut C, slides: &[Reference<C::N>], shares: [f64; 2]) -> [C::N; 2] {
+        let along = self.along(c, slides);
+        let [mut force, mut rate] = of_part(c, &self.pulley, &along, shares);
+        for (slide, reference) in self.slides.iter().zip(slides).filter(|(slide, _)| slide.lever != 0.0) {
+            let [push, change] = slide.push(c, reference, shares);
+            (force, rate) = (force + push * slide.lever, rate + change * slide.lever);
         }
         [force, rate]
+    }
+
+    /// Motor force at the belt for the motion of a rigid belt, N.
+    pub fn force(&self, slides: &[Reference]) -> f64 {
+        self.share_of_force(&mut Run::plain(), slides, self.shares())[0]
+    }
+
+    /// The factors on inertia and friction.
+    fn shares(&self) -> [f64; 2] {
+        [self.settings.inertia, self.settings.friction]
     }
 
     /// The motion of the drive for which the slides follow their references on an elastic belt: quasi-static for the
@@ -123,79 +144,86 @@ impl Forward {
     ///
     /// With pulleys that lead by S d, y = S (q + d), the spans stretch by s = −A_q d, since rigid motion stretches
     /// none. The slides need F = −A_qᵀ K s, so that d = (A_qᵀ K A_q)⁻¹ F; the belt pulls the pulley back by a_φᵀ K s.
-    fn stretched(&self, belt: &Belt, slides: &[Reference]) -> Needed {
-        let stiffness = belt.stiffness(slides);
-        let of_slides = belt.slides.transpose() * &stiffness * &belt.slides;
-        let Some(compliance) = of_slides.try_inverse() else {
-            return Needed { drive: self.along(slides), force: self.force(slides) };
-        };
+    fn stretched<C: Calculator>(&self, c: &mut C, belt: &Belt, slides: &[Reference<C::N>]) -> Needed<C::N> {
+        let stiffness = belt.stiffness(c, slides);
         // F = M y″ + b y′ + F_c sgn y′ − F₀ − F_x(y); the rates without F_x′ y′
-        let loads: Vec<[f64; 3]> = self.slides.iter().zip(slides).map(|(slide, y)| slide.load(y)).collect();
-        let ahead: [DVector<f64>; 3] = std::array::from_fn(|j| {
-            &compliance * DVector::from_iterator(loads.len(), loads.iter().map(|load| load[j]))
-        });
-        let lead =
-            |j: usize| -> f64 { self.slides.iter().zip(ahead[j].iter()).map(|(slide, d)| slide.share * d).sum() };
-        let y = self.along(slides);
+        let loads: Vec<[C::N; 3]> = self.slides.iter().zip(slides).map(|(slide, y)| slide.load(c, y)).collect();
+        let ahead = belt.stretch(c, &stiffness, [&loads[0], &loads[1]]);
+        let y = self.along(c, slides);
+        let mut lead = |j: usize, of: C::N| {
+            let moving = self.slides.iter().zip(&ahead).filter(|(slide, _)| slide.share != 0.0);
+            let sum = moving.fold(of, |sum, (slide, d)| sum + d[j] * slide.share);
+            c.name("lead", sum)
+        };
         let drive = Reference {
-            position: y.position + lead(0),
-            speed: y.speed + lead(1),
-            acceleration: y.acceleration + lead(2),
+            position: lead(0, y.position),
+            speed: lead(1, y.speed),
+            acceleration: lead(2, y.acceleration),
             ..y
         };
-        let pull = |j: usize| -belt.drive.dot(&(&stiffness * (&belt.slides * &ahead[j])));
-        let (mass, way) = (self.pulley.mass, direction(&y));
-        let (viscous, dry) = self.pulley.friction(drive.speed, way);
-        let damping = self.pulley.friction(drive.acceleration, way).0;
+        let pull = belt.pull(c, &stiffness, &ahead);
+        let (mass, way) = (self.pulley.mass, direction_by(c, &y));
+        let (viscous, dry) = self.pulley.friction_by(c, drive.speed, way);
+        let damping = self.pulley.friction_by(c, drive.acceleration, way).0;
         Needed {
             drive,
-            force: [mass * drive.acceleration + viscous + dry + pull(0), mass * y.jerk + damping + pull(1)],
+            force: [drive.acceleration * mass + viscous + dry + pull[0], y.jerk * mass + damping + pull[1]],
         }
     }
 
-    /// Command for this force, V or A.
-    pub fn command(&self, slides: &[Reference]) -> f64 {
-        match (&self.belt, self.settings.model) {
-            (_, FeedForwardModel::None) => 0.0,
+    /// Command for this force, V or A; none without feed-forward.
+    pub fn command<C: Calculator>(&self, c: &mut C, slides: &[Reference<C::N>]) -> Option<C::N> {
+        let command = match (&self.belt, self.settings.model) {
+            (_, FeedForwardModel::None) => return None,
             (Some(belt), FeedForwardModel::Elastic) => {
-                // What is not fed forward of inertia and friction is that of a rigid belt.
-                let Needed { drive, force: [force, rate] } = self.stretched(belt, slides);
-                let less = self.share_of_force(slides, [1.0; 2])[0] - self.force(slides)[0];
-                self.pulley.command(force - less, rate, &self.accelerated(drive))
+                let Needed { drive, force: [mut force, rate] } = self.stretched(c, belt, slides);
+                if self.shares() != [1.0; 2] {
+                    // What is not fed forward of inertia and friction is that of a rigid belt.
+                    let [whole, fed] =
+                        [[1.0; 2], self.shares()].map(|shares| self.share_of_force(c, slides, shares)[0]);
+                    force = force - (whole - fed);
+                }
+                self.pulley.command_by(c, force, rate, &self.accelerated(drive))
             }
             _ => {
-                let [force, rate] = self.force(slides);
-                self.pulley.command(force, rate, &self.accelerated(self.along(slides)))
+                let [force, rate] = self.share_of_force(c, slides, self.shares());
+                let along = self.along(c, slides);
+                self.pulley.command_by(c, force, rate, &self.accelerated(along))
             }
-        }
+        };
+        Some(c.name("forward", command))
     }
 
-    /// The command in two parts: the current for a current loop, A, and the voltage for the back-EMF, V.
-    pub fn split(&self, slides: &[Reference]) -> (f64, f64) {
-        let command = self.command(slides);
-        if command == 0.0 {
-            return (0.0, 0.0);
-        }
-        let outside = self.pulley.command(0.0, 0.0, &Reference::steady(self.along(slides).speed));
-        ((command - outside) * self.pulley.amperes_per_command(), outside)
+    /// The command in two parts: the current for a current loop, A, and the voltage for the back-EMF, V; none without
+    /// feed-forward.
+    pub fn split<C: Calculator>(&self, c: &mut C, slides: &[Reference<C::N>]) -> Option<[C::N; 2]> {
+        let command = self.command(c, slides)?;
+        let speed = self.along(c, slides).speed;
+        Some(self.pulley.split(c, speed, command))
     }
 
     /// Motor current, A, and terminal voltage, V, for the force with a rigid belt.
     pub fn electrical(&self, slides: &[Reference]) -> (f64, f64) {
-        let [force, rate] = self.force(slides);
-        self.pulley.electrical(force, rate, &self.accelerated(self.along(slides)))
+        let c = &mut Run::plain();
+        let [force, rate] = self.share_of_force(c, slides, self.shares());
+        let along = self.along(c, slides);
+        self.pulley.electrical(force, rate, &self.accelerated(along))
     }
 
     /// A motion of the pulley with the share of the inertia that is fed forward.
-    fn accelerated(&self, y: Reference) -> Reference {
+    fn accelerated<N: Number>(&self, y: Reference<N>) -> Reference<N> {
         let share = self.settings.inertia;
+        if share == 1.0 {
+            return y;
+        }
         Reference { acceleration: y.acceleration * share, jerk: y.jerk * share, ..y }
     }
 }
 
 /// F = M y″ + b y′ + F_c sgn y′ − F₀, and the rate of its inertial part, N and N/s.
-fn of_part(part: &Rigid, y: &Reference, [inertia, friction]: [f64; 2]) -> [f64; 2] {
-    let (viscous, dry) = part.friction(y.speed, direction(y));
+fn of_part<C: Calculator>(c: &mut C, part: &Rigid, y: &Reference<C::N>, [inertia, friction]: [f64; 2]) -> [C::N; 2] {
+    let way = direction_by(c, y);
+    let (viscous, dry) = part.friction_by(c, y.speed, way);
     let mass = inertia * part.mass;
     [y.acceleration * mass + (viscous + dry) * friction - part.constant, y.jerk * mass]
 }
@@ -203,44 +231,76 @@ fn of_part(part: &Rigid, y: &Reference, [inertia, friction]: [f64; 2]) -> [f64; 
 impl Slide {
     /// The force that it needs from the belt, N, with these factors on inertia and friction, and the rate of its
     /// inertial part, N/s.
-    fn push(&self, y: &Reference, shares: [f64; 2]) -> [f64; 2] {
-        let [force, rate] = of_part(&self.part, y, shares);
-        [force - self.along.as_ref().map_or(0.0, |line| line.value(y.position)), rate]
+    fn push<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>, shares: [f64; 2]) -> [C::N; 2] {
+        let [force, rate] = of_part(c, &self.part, y, shares);
+        let along = self.along.as_ref().map(|line| line.value_by(c, y.position));
+        [along.map_or(force, |along| force - along), rate]
     }
 
     /// The whole force, N, with its first and second rate, N/s and N/s².
-    fn load(&self, y: &Reference) -> [f64; 3] {
-        let way = direction(y);
-        let drag = |speed: f64| self.part.friction(speed, way).0;
-        let [force, rate] = self.push(y, [1.0; 2]);
-        [force, rate + drag(y.acceleration), self.part.mass * y.snap + drag(y.jerk)]
+    fn load<C: Calculator>(&self, c: &mut C, y: &Reference<C::N>) -> [C::N; 3] {
+        let way = direction_by(c, y);
+        let [force, rate] = self.push(c, y, [1.0; 2]);
+        let [drag, change] = [y.acceleration, y.jerk].map(|speed| self.part.friction_by(c, speed, way).0);
+        [force, rate + drag, y.snap * self.part.mass + change].map(|load| c.name("load", load))
     }
 }
 
 impl Belt {
     fn of(machine: &Machine, drive: usize) -> Self {
         let geometry = machine.geometry();
-        let bodies: Vec<usize> = geometry.slides.iter().map(|slide| slide.body).collect();
-        let spans: Vec<Spring> = machine.mechanism().springs.into_iter().take(geometry.spans.len()).collect();
+        let bodies = [0, 1].map(|slide: usize| geometry.slides[slide].body);
+        let springs = machine.mechanism().springs.into_iter().take(geometry.spans.len());
         let arm = |span: &Spring, body: usize| -> f64 {
             span.arms.iter().filter(|(of, _)| *of == body).map(|(_, arm)| arm).sum()
         };
         let pulley = geometry.drives[drive].pulley;
-        Self {
-            slides: DMatrix::from_fn(spans.len(), bodies.len(), |span, slide| arm(&spans[span], bodies[slide])),
-            drive: DVector::from_fn(spans.len(), |span, _| arm(&spans[span], pulley) / machine.pulley_radius),
-            spans,
-            bodies,
-        }
+        let span = |span: Spring| Span {
+            slides: bodies.map(|body| arm(&span, body)),
+            drive: arm(&span, pulley) / machine.pulley_radius,
+            stiffness: span.stiffness,
+            follows: span.follows,
+        };
+        Self { spans: springs.map(span).collect(), bodies }
     }
 
-    /// K with the slides at their references, N/m.
-    fn stiffness(&self, slides: &[Reference]) -> DMatrix<f64> {
-        let position = |body: usize| {
-            let number = self.bodies.iter().position(|of| *of == body);
-            number.and_then(|number| slides.get(number)).map_or(0.0, |y| y.position)
+    /// Stiffness of each span with the slides at their references, N/m.
+    fn stiffness<C: Calculator>(&self, c: &mut C, slides: &[Reference<C::N>]) -> Vec<C::N> {
+        let position =
+            |body: usize| self.bodies.iter().position(|of| *of == body).map(|number| slides[number].position);
+        let of = |span: &Span| match &span.follows {
+            Some(follows) => {
+                let stiffness = follows.stiffness_by(c, position);
+                c.name("stiffness", stiffness)
+            }
+            None => c.number(span.stiffness),
         };
-        let of = |span: &Spring| span.follows.as_ref().map_or(span.stiffness, |follows| follows.stiffness(position));
-        DMatrix::from_diagonal(&DVector::from_iterator(self.spans.len(), self.spans.iter().map(of)))
+        self.spans.iter().map(of).collect()
+    }
+
+    /// Σ w_i k_i over the spans.
+    fn sum<C: Calculator>(&self, c: &mut C, stiffness: &[C::N], weight: impl Fn(&Span) -> f64) -> C::N {
+        let weights = self.spans.iter().map(weight);
+        let parts = stiffness.iter().zip(weights).filter(|(_, weight)| *weight != 0.0).map(|(k, weight)| *k * weight);
+        parts.reduce(|sum, part| sum + part).unwrap_or_else(|| c.number(0.0))
+    }
+
+    /// d = (A_qᵀ K A_q)⁻¹ F with first and second rates, for each slide. The columns of A_q are independent for each
+    /// kind of machine.
+    fn stretch<C: Calculator>(&self, c: &mut C, stiffness: &[C::N], loads: [&[C::N; 3]; 2]) -> [[C::N; 3]; 2] {
+        let mut of = |i: usize, j: usize| self.sum(c, stiffness, |span| span.slides[i] * span.slides[j]);
+        let (k_xx, k_xy, k_yy) = (of(0, 0), of(0, 1), of(1, 1));
+        let determinant = k_xx * k_yy - k_xy * k_xy;
+        let [xx, xy, yy] = [k_yy, -k_xy, k_xx].map(|k| c.name("compliance", k / determinant));
+        let mut stretch = |one: C::N, other: C::N| {
+            std::array::from_fn(|j| c.name("stretch", one * loads[0][j] + other * loads[1][j]))
+        };
+        [stretch(xx, xy), stretch(xy, yy)]
+    }
+
+    /// −a_φᵀ K s = a_φᵀ K A_q d negated, the pull of the belt on the pulley that the motor overcomes, N, and its rate.
+    fn pull<C: Calculator>(&self, c: &mut C, stiffness: &[C::N], ahead: &[[C::N; 3]; 2]) -> [C::N; 2] {
+        let [x, y] = [0, 1].map(|slide: usize| self.sum(c, stiffness, |span| -span.drive * span.slides[slide]));
+        std::array::from_fn(|j| c.name("pull", x * ahead[0][j] + y * ahead[1][j]))
     }
 }

@@ -1,5 +1,7 @@
 //! A reference at an instant, and what limits it.
 
+use crate::calculator::{Calculator, Number};
+
 /// Limits of a move. SI units; all above zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
@@ -38,15 +40,25 @@ impl Reference {
     pub fn steady(speed: f64) -> Self {
         Self { speed, ..Self::default() }
     }
+}
 
+impl<N: Number> Reference<N> {
     /// Itself and `weight` times another.
     pub fn plus(self, weight: f64, other: Self) -> Self {
         Self {
-            position: self.position + weight * other.position,
-            speed: self.speed + weight * other.speed,
-            acceleration: self.acceleration + weight * other.acceleration,
-            jerk: self.jerk + weight * other.jerk,
-            snap: self.snap + weight * other.snap,
+            position: self.position + other.position * weight,
+            speed: self.speed + other.speed * weight,
+            acceleration: self.acceleration + other.acceleration * weight,
+            jerk: self.jerk + other.jerk * weight,
+            snap: self.snap + other.snap * weight,
         }
+    }
+
+    /// Σ w_s q_s, such as the position of a drive along its belt from those of all slides.
+    pub fn weighed<C: Calculator<N = N>>(c: &mut C, weights: &[f64], slides: &[Self]) -> Self {
+        let zero = c.number(0.0);
+        let none = Self { position: zero, speed: zero, acceleration: zero, jerk: zero, snap: zero };
+        let moving = weights.iter().zip(slides).filter(|(weight, _)| **weight != 0.0);
+        moving.fold(none, |sum, (weight, slide)| sum.plus(*weight, *slide))
     }
 }

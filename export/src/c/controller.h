@@ -9,7 +9,7 @@
 /* How far ahead of the sample `ahead` is looked up, s. */
 #define @NAME@_LEAD @lead@
 
-/* Where the cart should be, and how that changes. */
+@arrays@/* Where @whose@ should be, and how that changes. */
 typedef struct {
 @fields@
 } @name@_reference;

@@ -1,7 +1,7 @@
 //! The controller in C: its program written out.
 
 use super::{Writer, plain};
-use crate::controller::{DERIVATIVES, program};
+use crate::controller::{DERIVATIVES, input, program, slides};
 use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
@@ -17,13 +17,16 @@ pub(super) struct Controller {
     design: Design,
     program: Program,
     unit: &'static str,
+    /// Of a gantry, the slides whose references it takes.
+    slides: Vec<&'static str>,
 }
 
 impl Controller {
     /// That of a drive.
     pub(super) fn new(design: &Design, machine: &Machine, drive: usize) -> Result<Self> {
         let unit = machine.drives[drive].amplifier.mode.unit();
-        Ok(Self { design: design.clone(), program: program(design, machine)?, unit })
+        let program = program(design, machine, drive)?;
+        Ok(Self { design: design.clone(), program, unit, slides: slides(machine) })
     }
 
     pub(super) fn facts(&self) -> Vec<(String, String)> {
@@ -39,7 +42,12 @@ impl Controller {
         let fields = DERIVATIVES.map(|(name, unit)| format!("    @name@_real {name}; /* {unit} */"));
         let lead = self.design.feed_forward.lead.unwrap_or(self.design.delay + 0.5 * self.design.every);
         let shaper: String = shaper_remark(&self.design).iter().map(|line| format!(" * {line}\n")).collect();
+        let [arrays, whose] = match self.slides[..] {
+            [] => [String::new(), "the cart".into()],
+            _ => [self.arrays(), "a slide".into()],
+        };
         let text = HEADER.replace("@fields@", &fields.join("\n")).replace("@shaper@", &shaper);
+        let text = text.replace("@arrays@", &arrays).replace("@whose@", &whose);
         writer.fill(
             &text,
             &[
@@ -50,6 +58,28 @@ impl Controller {
                 ("@unit@", self.unit),
             ],
         )
+    }
+
+    /// Indices of the slides in arrays of references.
+    fn arrays(&self) -> String {
+        let mut text = String::from("/* `now` and `ahead` are arrays of the references of these. */\n");
+        for (number, slide) in self.slides.iter().enumerate() {
+            let _ = writeln!(text, "#define @NAME@_SLIDE_{} {number}", slide.to_uppercase());
+        }
+        let _ = writeln!(text, "#define @NAME@_SLIDES {}\n", self.slides.len());
+        text
+    }
+
+    /// Inputs that are parts of references, and where they stand.
+    fn references(&self) -> impl Iterator<Item = (String, String)> {
+        let places = match self.slides[..] {
+            [] => vec![("", "->".to_string())],
+            _ => self.slides.iter().enumerate().map(|(number, slide)| (*slide, format!("[{number}]."))).collect(),
+        };
+        let of = ["now", "ahead"].into_iter().flat_map(move |of| places.clone().into_iter().map(move |at| (of, at)));
+        of.flat_map(|(of, (slide, place))| {
+            DERIVATIVES.map(|(part, _)| (input(of, slide, part), format!("{of}{place}{part}")))
+        })
     }
 
     pub(super) fn source(&self, writer: &Writer) -> String {
@@ -65,12 +95,8 @@ impl Controller {
             .map(|state| format!("    control.{} = {};", state.name, writer.number(0.0)))
             .collect();
         let mut body = String::new();
-        for input in program.inputs.iter().filter(|input| read.contains(&input.name)) {
-            let from = match input.name.split_once('_') {
-                Some((of @ ("now" | "ahead"), part)) => format!("{of}->{part}"),
-                _ => continue,
-            };
-            let _ = writeln!(body, "    const @name@_real {} = {from};", input.name);
+        for (name, from) in self.references().filter(|(name, _)| read.contains(name)) {
+            let _ = writeln!(body, "    const @name@_real {name} = {from};");
         }
         for local in &program.locals {
             let _ = writeln!(body, "    @name@_real {local};");

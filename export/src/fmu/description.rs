@@ -215,7 +215,7 @@ fn nominals(model: &Model) -> Option<Vec<f64>> {
 fn structure(xml: &mut String, shown: &[&Variable], version: Version) {
     let is_unknown = |variable: &Variable| {
         let calculated = variable.start.is_none();
-        calculated && matches!(variable.role, Role::Output(_) | Role::Error | Role::Command | Role::Rate(_))
+        calculated && matches!(variable.role, Role::Output(_) | Role::Error(_) | Role::Command(_) | Role::Rate(_))
     };
     let is_output = |variable: &Variable| variable.causality() == Causality::Output;
     let list = |wanted: &dyn Fn(&Variable) -> bool, element: &str| -> String {

@@ -22,7 +22,7 @@ pub use variable::{Causality, Kind, Role, Variability, Variable};
 /// Where the machine stands in the archive.
 pub(crate) const MACHINE: &str = "resources/machine.toml";
 
-/// Inputs that a controller inside has for the cart's reference: position and its first four derivatives.
+/// Inputs that controllers inside have for the reference of each slide: position and its first four derivatives.
 pub const REFERENCES: usize = 5;
 
 /// How the shared object is called in the archive, without its ending.

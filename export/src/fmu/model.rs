@@ -63,11 +63,6 @@ impl Model {
         let case = Case::from_text_with("machine.toml", text, &[])?;
         let [until, every] = resource::times(&case);
         let (machine, design) = (case.machine.clone(), case.controller.clone());
-        if with_controller && design.is_some() && !case.is_axis() {
-            let error = Error::new("an FMU of a gantry has no controller inside yet").in_file("--part");
-            return Err(error
-                .next("leave --part out for the machine; `taut export c` and `taut export st` have the controllers"));
-        }
         if with_controller && design.is_none() {
             let missing = controller(&case).map(|_| ());
             missing.map_err(|error| without_controller(&case, error, "leave --part out for the machine alone"))?;
@@ -107,10 +102,9 @@ impl Model {
         self.parameters.iter().map(|(free, _)| free.start).collect()
     }
 
-    /// The axis with these parameters, where it is one.
-    pub fn stage(&self, parameters: &[f64]) -> Option<Machine> {
-        let machine = self.set(parameters);
-        (machine.drives.len() == 1).then_some(machine)
+    /// Number of slides, each with its reference.
+    pub fn slides(&self) -> usize {
+        self.machine.geometry().slides.len()
     }
 
     /// The mechanism with these parameters, and with room for a force on the cart where a drive leaves some. Errors: a
@@ -203,7 +197,8 @@ impl Model {
         self.quantities.iter().map(|(quantity, _)| of(quantity)).collect()
     }
 
-    fn set(&self, parameters: &[f64]) -> Machine {
+    /// The machine with these parameters.
+    pub fn set(&self, parameters: &[f64]) -> Machine {
         let mut machine = self.machine.clone();
         let changed = self.parameters.iter().zip(parameters).filter(|((free, _), value)| free.start != **value);
         let changed: Vec<(&Free, f64)> = changed.map(|((free, _), value)| (free, *value)).collect();
@@ -247,6 +242,16 @@ impl Model {
         Some(Loop::of(design).lead).filter(|lead| *lead > 0.0)
     }
 
+    /// The prefix of the variables of each slide, none for an axis, and its name.
+    fn of_slides(&self) -> impl Iterator<Item = (String, &'static str)> {
+        let geometry = self.machine.geometry();
+        let is_alone = geometry.slides.len() == 1;
+        geometry.slides.iter().map(move |slide| {
+            let label = geometry.label(slide.body);
+            (if is_alone { String::new() } else { format!("{}_", label.key) }, label.name)
+        })
+    }
+
     fn inputs(&self, mechanism: &Mechanism) -> Vec<Variable> {
         let mut list = Vec::new();
         let mut add = |name: String, words: String, unit, shown: &str, role| {
@@ -258,15 +263,12 @@ impl Model {
         const UNITS: [(&str, &str); REFERENCES] =
             [("m", "mm"), ("m/s", "mm/s"), ("m/s^2", ""), ("m/s^3", ""), ("m/s^4", "")];
         if self.design.is_some() {
-            let what = [
-                "Reference of the cart: where it should be.",
-                "Its speed.",
-                "Its acceleration.",
-                "Its jerk.",
-                "Its snap.",
-            ];
-            for (k, ((end, words), (unit, shown))) in ENDINGS.into_iter().zip(what).zip(UNITS).enumerate() {
-                add(format!("reference{end}"), words.into(), unit, shown, Role::Reference(k));
+            let what = ["where it should be", "its speed", "its acceleration", "its jerk", "its snap"];
+            for (slide, (prefix, name)) in self.of_slides().enumerate() {
+                for (k, ((end, what), (unit, shown))) in ENDINGS.into_iter().zip(what).zip(UNITS).enumerate() {
+                    let (words, role) = (format!("Reference of the {name}: {what}."), slide * REFERENCES + k);
+                    add(format!("{prefix}reference{end}"), words, unit, shown, Role::Reference(role));
+                }
             }
         } else {
             let geometry = self.machine.geometry();
@@ -286,10 +288,15 @@ impl Model {
             add(format!("{}_force", label.key), words, "N", "", Role::Force(index));
         }
         if let Some(lead) = self.lead() {
-            let what = ["Reference", "Speed of the reference", "Its acceleration", "Its jerk", "Its snap"];
-            for (k, ((end, what), (unit, shown))) in ENDINGS.into_iter().zip(what).zip(UNITS).enumerate() {
-                let words = format!("{what} {} s ahead of time, for the feed-forward.", shortest(lead));
-                add(format!("reference_ahead{end}"), words, unit, shown, Role::Ahead(k));
+            let what = ["Position", "Speed", "Acceleration", "Jerk", "Snap"];
+            for (slide, (prefix, name)) in self.of_slides().enumerate() {
+                for (k, ((end, what), (unit, shown))) in ENDINGS.into_iter().zip(what).zip(UNITS).enumerate() {
+                    let lead = shortest(lead);
+                    let words =
+                        format!("{what} of the reference of the {name} {lead} s ahead of time, for the feed-forward.");
+                    let role = Role::Ahead(slide * REFERENCES + k);
+                    add(format!("{prefix}reference_ahead{end}"), words, unit, shown, role);
+                }
             }
         }
         list
@@ -314,13 +321,23 @@ impl Model {
             });
         }
         if let Some(design) = &self.design {
-            let next = OUTPUTS + mechanism.columns.len() as u32;
-            list.push(Variable {
-                shown: "mm".into(),
-                ..plain(next, "error", "The cart from its reference, x − y.", "m", Role::Error)
-            });
-            let words = format!("What the {} commands.", design.structure.name());
-            list.push(plain(next + 1, "command", &words, self.input_unit(), Role::Command));
+            let mut next = OUTPUTS + mechanism.columns.len() as u32;
+            let mut add = |name: String, words: String, (unit, shown): (&'static str, &str), role| {
+                list.push(Variable { shown: shown.into(), ..plain(next, &name, &words, unit, role) });
+                next += 1;
+            };
+            for (slide, (prefix, name)) in self.of_slides().enumerate() {
+                let words = format!("The {name} from its reference.");
+                add(format!("{prefix}error"), words, ("m", "mm"), Role::Error(slide));
+            }
+            for (drive, unit) in self.machine.drives.iter().enumerate() {
+                let (name, of) = match self.machine.geometry().drives {
+                    [_] => ("command".into(), String::new()),
+                    all => (format!("{}_command", all[drive].side()), format!(" for the {}", all[drive].label.name)),
+                };
+                let words = format!("What the {} commands{of}.", design.structure.name());
+                add(name, words, (unit.amplifier.mode.unit(), ""), Role::Command(drive));
+            }
         }
         list
     }

@@ -197,7 +197,7 @@ impl<'m> Writer<'m> {
                 Quantity::Bristle(_) => return Err(curved(variable)),
             },
             Role::Condition(_) => Entry::of("IS_HIDDEN", 0),
-            Role::Reference(_) | Role::Ahead(_) | Role::Error | Role::Command => return Err(curved(variable)),
+            Role::Reference(_) | Role::Ahead(_) | Role::Error(_) | Role::Command(_) => return Err(curved(variable)),
         })
     }
 

@@ -46,18 +46,18 @@ pub enum Role {
     Input(usize),
     /// A force on a body that the machine is there to move, by its place among these.
     Force(usize),
-    /// Where the controller's cart should be: position, speed, acceleration, jerk, snap.
+    /// Where each slide should be: position, speed, acceleration, jerk, snap.
     Reference(usize),
-    /// Reference one lead of the feed-forward later.
+    /// Those references one lead of the feed-forward later.
     Ahead(usize),
     /// A number of the machine, by its place among these, and whether it may change under way.
     Parameter(usize, bool),
     /// A column of a run.
     Output(usize),
-    /// The cart from its reference.
-    Error,
-    /// The controller's command.
-    Command,
+    /// A slide from its reference, by its number.
+    Error(usize),
+    /// The command for a drive, by its number.
+    Command(usize),
     /// An integrated quantity that is no column.
     Quantity(usize),
     /// The rate of an integrated quantity.
@@ -101,7 +101,7 @@ impl Variable {
             Role::Time => Causality::Independent,
             Role::Input(_) | Role::Force(_) | Role::Reference(_) | Role::Ahead(_) => Causality::Input,
             Role::Parameter(..) => Causality::Parameter,
-            Role::Output(_) | Role::Error | Role::Command => Causality::Output,
+            Role::Output(_) | Role::Error(_) | Role::Command(_) => Causality::Output,
             Role::Quantity(_) | Role::Rate(_) | Role::Condition(_) => Causality::Local,
         }
     }
@@ -111,7 +111,7 @@ impl Variable {
         match (self.role, self.kind) {
             (Role::Parameter(_, true), _) => Variability::Tunable,
             (Role::Parameter(_, false), _) => Variability::Fixed,
-            (Role::Command, _) | (_, Kind::Whole) => Variability::Discrete,
+            (Role::Command(_), _) | (_, Kind::Whole) => Variability::Discrete,
             _ if self.is_count() => Variability::Discrete,
             _ => Variability::Continuous,
         }

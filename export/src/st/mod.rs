@@ -1,9 +1,10 @@
 //! IEC 61131-3 Structured Text: the controller as a function block.
 
 use super::controller::program;
-use super::program::{Expr, Node, Statement, Test, sign};
+use super::program::{Expr, Node, Program, Statement, Test, sign};
 use super::{Exported, Part, controller, drives_note, identifier, shaper_note, shaper_remark, without_controller};
 use crate::case::Case;
+use crate::design::Design;
 use crate::error::{Error, Result};
 use std::fmt::Write;
 
@@ -18,8 +19,34 @@ pub(super) fn export(case: &Case, part: Option<Part>, stem: &str) -> Result<Expo
             .in_file("--part")
             .next("leave --part out; `taut export fmu` has the machine"));
     }
-    let program = program(design, &case.machine)?;
-    let unit = case.machine.drives[0].amplifier.mode.unit();
+    let drives = case.machine.geometry().drives;
+    let (mut texts, mut names, mut states) = (Vec::new(), Vec::new(), 0);
+    for (number, at) in drives.iter().enumerate() {
+        let name = match drives {
+            [_] => format!("{}_controller", identifier(stem)),
+            _ => format!("{}_{}_controller", identifier(stem), at.side()),
+        };
+        let program = program(design, &case.machine, number)?;
+        let unit = case.machine.drives[number].amplifier.mode.unit();
+        texts.push(function_block(case, design, &program, (&name, unit)));
+        names.push(name);
+        states = program.states.len();
+    }
+    let facts = vec![
+        (if drives.len() == 1 { "function block" } else { "function blocks" }.into(), names.join(", ")),
+        ("controller".into(), design.structure.name().into()),
+        ("sample time".into(), format!("{:?} s", design.every)),
+        ("numbers that it keeps".into(), states.to_string()),
+    ];
+    let mut notes =
+        vec!["untried on a real controller: its grammar is checked, and it is run by an interpreter".into()];
+    notes.extend(drives_note(case));
+    notes.extend(shaper_note(design));
+    Ok(Exported { files: vec![(format!("{stem}.st"), texts.join("\n").into_bytes())], facts, notes })
+}
+
+/// A program as a function block of this name, with the unit of its command.
+fn function_block(case: &Case, design: &Design, program: &Program, (name, unit): (&str, &str)) -> String {
     let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
     let read = &program.read;
     let inputs = program.inputs.iter().filter(|input| read.contains(&input.name));
@@ -35,14 +62,13 @@ pub(super) fn export(case: &Case, part: Option<Part>, stem: &str) -> Result<Expo
         program.states.iter().map(|state| format!("    {} := {};", state.name, literal(0.0))).collect();
     let mut body = String::new();
     block(&program.body, 0, &mut body);
-    let name = format!("{}_controller", identifier(stem));
     let mut text = BLOCK.to_string();
     for (place, part) in [
         ("@title@", plain(&case.title)),
         ("@shaper@", shaper_remark(design).iter().map(|line| format!("(* {line} *)\n")).collect()),
         ("@structure@", plain(design.structure.name())),
         ("@version@", env!("CARGO_PKG_VERSION").into()),
-        ("@name@", name.clone()),
+        ("@name@", name.into()),
         ("@every@", literal(design.every)),
         ("@delay@", literal(design.delay)),
         ("@lead@", literal(lead)),
@@ -55,17 +81,7 @@ pub(super) fn export(case: &Case, part: Option<Part>, stem: &str) -> Result<Expo
     ] {
         text = text.replace(place, &part);
     }
-    let facts = vec![
-        ("function block".into(), name),
-        ("controller".into(), design.structure.name().into()),
-        ("sample time".into(), format!("{:?} s", design.every)),
-        ("numbers that it keeps".into(), program.states.len().to_string()),
-    ];
-    let mut notes =
-        vec!["untried on a real controller: its grammar is checked, and it is run by an interpreter".into()];
-    notes.extend(drives_note(case));
-    notes.extend(shaper_note(design));
-    Ok(Exported { files: vec![(format!("{stem}.st"), text.into_bytes())], facts, notes })
+    text
 }
 
 /// A text as a comment can hold it.
