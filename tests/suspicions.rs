@@ -160,7 +160,7 @@ fn jumps_are_found_beside_narrow_band_noise() {
 #[test]
 fn a_magnitude_is_named() {
     let mut magnitudes = 0;
-    for seed in 1..=10 {
+    for seed in 1..=4 {
         let case = drawn(700 + seed, 0.0, 0);
         let mut bad = case.clone();
         let values = &mut Arc::make_mut(bad.experiments[0].log.as_mut().unwrap()).outputs[0].values;
@@ -176,7 +176,7 @@ fn a_magnitude_is_named() {
             assert!(told.iter().any(|one| one.contains("absolute = [\"cart_position\"]")), "{seed}: {told:?}");
         }
     }
-    assert!(magnitudes >= 5, "{magnitudes}");
+    assert!(magnitudes >= 2, "{magnitudes}");
 }
 
 /// A time as findings write it.

@@ -471,5 +471,5 @@ fn a_bridge_that_yaws_beyond_its_model_is_warned_of() {
     let (status, told) = run(&soft);
     assert_eq!(status, Some(1));
     let told = told.split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(told.contains("its equations are for less than 100 mrad"), "{told}");
+    assert!(told.contains("its equations are for less than 0.1 rad"), "{told}");
 }
