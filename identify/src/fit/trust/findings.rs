@@ -117,7 +117,7 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
 
 /// Residuals above the noise of the logs. With several coordinates or a stepper, elastic modes cause local minima; with
 /// one coordinate the missing elements have been tried, and `is_named` if one of them, or another reason, is reported.
-/// A vibration cannot be told from narrow-band noise.
+/// A vibration cannot be told from narrow-band noise; residuals that keep their sign for long are an error of the model.
 fn of_noise(found: &Searched, fit: &Fit, is_named: bool) -> Option<Finding> {
     let problem = &found.problem;
     let is_searched = problem.machine.has_torque_balance();
@@ -132,7 +132,7 @@ fn of_noise(found: &Searched, fit: &Fit, is_named: bool) -> Option<Finding> {
         .iter()
         .map(|own| oscillating(own).map(|(_, hertz)| engineering(*hertz, "Hz", 2).replace('\u{a0}', " ")))
         .collect();
-    let next = if let (true, Some(frequencies)) = (is_searched, frequencies) {
+    let next = if let (true, Some(frequencies)) = (is_searched && problem.swings, frequencies) {
         &format!(
             "they oscillate at {}, by a vibration that the model lacks or by noise, for which the intervals allow",
             frequencies.join(" and ")
