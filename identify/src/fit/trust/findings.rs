@@ -117,7 +117,7 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
 
 /// Residuals above the noise of the logs. With several coordinates or a stepper, elastic modes cause local minima; with
 /// one coordinate the missing elements have been tried, and `is_named` if one of them, or another reason, is reported.
-/// A vibration cannot be told from narrow-band noise; residuals that keep their sign for long are an error of the model.
+/// A vibration cannot be told from narrow-band noise; residuals that keep their sign for long are no noise.
 fn of_noise(found: &Searched, fit: &Fit, is_named: bool) -> Option<Finding> {
     let problem = &found.problem;
     let is_searched = problem.machine.has_torque_balance();
