@@ -18,7 +18,6 @@ use taut::case::{Case, Files};
 use taut::files::Claim;
 use taut::json::{self, Simulation};
 use taut::machine::Machine;
-use taut::metrics::Metrics;
 use taut::solve::{self, Ending, Solver};
 use taut::{Error, Result};
 use taut_report::simulate::{Run, early_end, hidden, report, yawed};
@@ -118,8 +117,9 @@ fn simulate(args: &Simulate, path: &Path, case: &Case) -> Outcome {
         .map(|run| Ended {
             name: &run.experiment.name,
             outcome: &run.outcome,
-            metrics: &run.metrics,
             early: early_end(run, &case.machine),
+            doubt: hidden("run", &run.experiment.name, &run.outcome)
+                .or_else(|| yawed(&run.experiment.name, &run.metrics)),
         })
         .collect();
     (finished.status, finished.remarks) = status(&ended, solver, &interrupt);
@@ -195,20 +195,16 @@ fn measurable(case: &Case, solver: Solver, path: &Path) -> Result<()> {
 pub struct Ended<'a> {
     name: &'a str,
     outcome: &'a solve::Outcome,
-    metrics: &'a Metrics,
     /// Where it ended early: what is told of that.
     early: Option<String>,
-}
-
-/// Why a run is not to be relied on.
-fn unreliable(name: &str, outcome: &solve::Outcome, metrics: &Metrics) -> Option<String> {
-    hidden("run", name, outcome).or_else(|| yawed(name, metrics))
+    /// Why it is not to be relied on.
+    doubt: Option<String>,
 }
 
 /// How it ended, and a word about every run that did not reach its end.
 fn status(runs: &[Ended], solver: Solver, interrupt: &Interrupt) -> (Status, Vec<Remark>) {
     let mut remarks = Vec::new();
-    for Ended { name, outcome, metrics, early } in runs {
+    for Ended { name, outcome, early, doubt } in runs {
         if let Some(told) = early {
             let advice = match (outcome.ending, solver) {
                 (Ending::Diverged { .. }, Solver::Table3 { .. }) => "; a smaller --step may help",
@@ -217,11 +213,9 @@ fn status(runs: &[Ended], solver: Solver, interrupt: &Interrupt) -> (Status, Vec
             };
             remarks.push(Remark::Error(format!("the run \"{name}\" {told}{advice}")));
         }
-        remarks.extend(unreliable(name, outcome, metrics).map(Remark::Warning));
+        remarks.extend(doubt.clone().map(Remark::Warning));
     }
-    let relied = |run: &Ended| {
-        run.outcome.ending == Ending::Complete && unreliable(run.name, run.outcome, run.metrics).is_none()
-    };
+    let relied = |run: &Ended| run.outcome.ending == Ending::Complete && run.doubt.is_none();
     let status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if runs.iter().all(relied) => Status::Done,

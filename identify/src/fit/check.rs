@@ -6,10 +6,10 @@ use crate::fit::asked::problem::Stop;
 use crate::fit::search::regression::{Balance, regression};
 use crate::fit::trust::found::{Estimate, Fit};
 use crate::fit::trust::identify::{Group, Identifiability};
-use crate::fit::trust::nearest::search;
+use crate::fit::trust::nearest::{Assessed, search};
 use crate::fit::trust::proposals::{Proposal, proposals};
-use crate::fit::trust::result::told;
 use crate::log::Survey;
+use crate::number::engineering_typed;
 use crate::solve::Flow;
 
 /// The result of a check before a fit.
@@ -58,24 +58,23 @@ pub fn check_watched(
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Check> {
     let settled = search(case, plan, stop, watch)?;
-    let judged = settled.judged(case, plan);
+    let Assessed { fit, surveys, judged } = settled.assessed(case, plan);
     let found = settled.searched;
     let experiments = judged.as_ref().map_or(Vec::new(), |judged| proposals(&found, judged));
     let noise: Vec<String> = found
         .noise
         .iter()
         .map(|(quantity, sigma)| {
-            let sigma = crate::number::engineering(*sigma, quantity.unit(), 2).replace('\u{a0}', " ");
+            let sigma = engineering_typed(*sigma, quantity.unit(), 2);
             format!("{} {sigma}", quantity.name())
         })
         .collect();
     let alike = judged.as_ref().map_or(String::new(), |judged| format!(", {}", judged.slow_words(&found.problem)));
     let noise_words = format!("residual noise: {}{alike}", noise.join(", "));
     let balance = regression(&found.problem);
-    let (fit, logs) = told(case, plan, &found, judged.as_ref());
     Ok(Check {
         balance,
-        logs,
+        logs: surveys,
         identifiability: judged.map(|judged| judged.identifiability),
         choices: fit.choices.clone(),
         noise_words,

@@ -57,7 +57,6 @@ use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::solve::Flow;
 use trust::nearest::search;
-use trust::result::told;
 
 /// Finds the parameters of `plan` from the logs of `case`.
 ///
@@ -74,6 +73,5 @@ pub fn fit_watched(
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Fit> {
     let settled = search(case, plan, stop, watch)?;
-    let judged = settled.judged(case, plan);
-    Ok(told(case, plan, &settled.searched, judged.as_ref()).0)
+    Ok(settled.assessed(case, plan).fit)
 }

@@ -19,7 +19,7 @@ use crate::fit::trust::found::Fit;
 use crate::fit::trust::held_out::{met, nothing};
 use crate::fit::trust::nearest::search_near;
 use crate::fit::trust::parts::{Parts, errors};
-use crate::fit::trust::result::{known, told};
+use crate::fit::trust::result::known;
 use crate::fit::trust::scores::together;
 use crate::log::Quantity;
 use crate::machine::Machine;
@@ -350,10 +350,8 @@ impl Course<'_> {
                 Case { experiments: self.case.experiments.clone(), unread: Vec::new(), machine: case.machine, ..read };
         }
         let settled = search_near(&case, &own.given, &plan, self.stop, &mut |_, _| Flow::Continue)?;
-        let judged = settled.judged(&case, &plan);
-        let found = settled.searched;
-        self.work.add(&found.work);
-        let (fit, _) = told(&case, &plan, &found, judged.as_ref());
+        self.work.add(&settled.searched.work);
+        let fit = settled.assessed(&case, &plan).fit;
         Ok(Comparison {
             chosen,
             by_training,

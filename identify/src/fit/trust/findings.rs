@@ -18,7 +18,7 @@ use crate::fit::search::regression::Balance;
 use crate::fit::search::starts::Searched;
 use crate::log::{Channel, Note, Quantity, Remedy, Severity, Survey};
 use crate::machine::{AmplifierMode, DriveAt, DriveUnit, Motor};
-use crate::number::{engineering, significant};
+use crate::number::{engineering_typed, significant};
 
 /// All findings, warnings first.
 pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, surveys: &[Survey]) -> Vec<Finding> {
@@ -128,10 +128,8 @@ fn of_noise(found: &Searched, fit: &Fit, is_named: bool) -> Option<Finding> {
     let beyond: Vec<(Quantity, f64)> = found.times_noise().filter(|(_, times)| *times > most).collect();
     let named = |(quantity, times): &(Quantity, f64)| format!("{} {} times", quantity.name(), significant(*times, 2));
     let oscillating = |(quantity, _): &(Quantity, f64)| fit.oscillations.iter().find(|(own, _)| own == quantity);
-    let frequencies: Option<Vec<String>> = beyond
-        .iter()
-        .map(|own| oscillating(own).map(|(_, hertz)| engineering(*hertz, "Hz", 2).replace('\u{a0}', " ")))
-        .collect();
+    let frequencies: Option<Vec<String>> =
+        beyond.iter().map(|own| oscillating(own).map(|(_, hertz)| engineering_typed(*hertz, "Hz", 2))).collect();
     let next = if let (true, Some(frequencies)) = (is_searched && problem.swings, frequencies) {
         &format!(
             "they oscillate at {}, by a vibration that the model lacks or by noise, for which the intervals allow",
@@ -233,7 +231,7 @@ fn of_search(fit: &Fit) -> Vec<Finding> {
         let text = format!(
             "{}: its error repeats with position, by ±{} every {}; the intervals are widened by its effect",
             quantity.name(),
-            engineering(*amplitude, quantity.unit(), 2).replace('\u{a0}', " "),
+            engineering_typed(*amplitude, quantity.unit(), 2),
             plain(*length, quantity.unit())
         );
         all.push(finding(Grade::Note, "place", text));
@@ -269,7 +267,7 @@ fn of_cause(fit: &Fit) -> Option<Finding> {
 
 /// A value in three digits.
 fn shown(value: f64, unit: &str) -> String {
-    engineering(value, unit, 3).replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
+    engineering_typed(value, unit, 3)
 }
 
 /// Finding if K_t and K_e cannot belong to one motor.
@@ -346,7 +344,7 @@ fn of_residuals(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, others: &
 }
 
 fn plain(value: f64, unit: &str) -> String {
-    engineering(value, unit, 4).replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
+    engineering_typed(value, unit, 4)
 }
 
 impl Balance {

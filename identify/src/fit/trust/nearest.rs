@@ -11,6 +11,9 @@
 //! The sum is at most that at x₁, so C grows by at most a relative ε, however well the logs determine these directions.
 //! A curved set is approached in rounds, each with the directions at its starting point.
 
+use super::findings::findings;
+use super::found::Fit;
+use super::result::result;
 use super::uncertainty::Judged;
 use super::{causes, other_laws, sub_records, trials};
 use crate::case::{Case, Plan};
@@ -21,6 +24,7 @@ use crate::fit::limits::{COST_GROWTH, HUBER, NEAREST_ALL, NEAREST_ITERATIONS, NE
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options, cost_of};
 use crate::fit::search::starts::{Effort, Searched, Work, search_as_far};
+use crate::log::Survey;
 use crate::machine::Machine;
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
@@ -32,10 +36,29 @@ pub(crate) struct Settled<'a> {
     seen: Option<Judged>,
 }
 
+/// The result of a search that has settled.
+pub(crate) struct Assessed {
+    /// The fit with its findings.
+    pub fit: Fit,
+    /// The surveys of the logs.
+    pub surveys: Vec<Survey>,
+    /// The information of the logs; `None` if numbers fail.
+    pub judged: Option<Judged>,
+}
+
 impl Settled<'_> {
-    /// The information of the logs there, with the tests of their parts and of the friction law; `None` if numbers
-    /// fail.
-    pub fn judged(&self, case: &Case, plan: &Plan) -> Option<Judged> {
+    /// The result, with findings of the logs and of the fit.
+    pub fn assessed(&self, case: &Case, plan: &Plan) -> Assessed {
+        let surveys = trials::surveys(case, plan, &self.searched);
+        let judged = self.judged(case, plan, &surveys);
+        let mut fit = result(&self.searched, judged.as_ref());
+        fit.findings = findings(case, plan, &self.searched, &fit, &surveys);
+        Assessed { fit, surveys, judged }
+    }
+
+    /// The information of the logs there, with the tests of their parts and of the friction law, and of missing elements
+    /// unless these `surveys` of the logs explain the residuals; `None` if numbers fail.
+    fn judged(&self, case: &Case, plan: &Plan, surveys: &[Survey]) -> Option<Judged> {
         let Minimum { residuals, jacobian, x, at_bound, .. } = &self.searched.best;
         let mut judged = match self.seen.as_ref().filter(|_| !at_bound.contains(&true)) {
             Some(seen) => seen.clone(),
@@ -45,10 +68,11 @@ impl Settled<'_> {
         let other_law = other_laws::other_law(&self.searched, &judged);
         // No element reverses a motion, folds it, or moves an input by more than a delay.
         let found = &self.searched;
-        let is_asked = !trials::is_reversed(case, plan, found)
+        let is_told = |code: &str| surveys.iter().any(|survey| survey.has(code));
+        let is_asked = !is_told("magnitude")
+            && !is_told("shift")
             && causes::is_asked(case, plan, found, &judged)
-            && !trials::is_magnitude(case, plan, found)
-            && !trials::is_shifted(case, plan, found);
+            && !trials::is_reversed(case, plan, found);
         let cause = is_asked.then(|| causes::cause(case, plan, found, other_law.as_ref())).flatten();
         let other_law = other_law.filter(|_| cause.is_none());
         judged.widen(disagreement, other_law, cause);

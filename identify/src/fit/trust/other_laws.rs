@@ -27,7 +27,7 @@ use crate::fit::search::triangle::inverse_of_square;
 use crate::friction::{Friction, Law, Shape};
 use crate::log::Quantity;
 use crate::machine::Machine;
-use crate::number::engineering;
+use crate::number::engineering_typed;
 use crate::solve::Bench;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
@@ -150,7 +150,7 @@ impl Candidate {
     }
 
     fn words(self, amplitude: f64) -> String {
-        let shown = |value, unit| engineering(value, unit, 2).replace('\u{a0}', " ");
+        let shown = |value, unit| engineering_typed(value, unit, 2);
         let (force, speed) = self.body.units();
         let whose = self.body.key().replace('_', " ");
         match self.kind {

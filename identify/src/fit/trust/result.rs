@@ -1,26 +1,14 @@
 //! Result at a minimum: estimates with their intervals, and the agreement with each log.
 
-use super::findings::findings;
 use super::found::{Estimate, Fit};
 use super::held_out::{Known, met};
 use super::scores::compared;
-use super::trials::surveys;
 use super::uncertainty::Judged;
-use crate::case::{Case, Plan};
 use crate::fit::asked::run::Nuisance;
 use crate::fit::noise::student::student;
 use crate::fit::search::starts::Searched;
 use crate::fit::search::triangle::inverse_of_square;
-use crate::log::Survey;
 use nalgebra::DVector;
-
-/// The result with its findings, and the surveys of the logs.
-pub(crate) fn told(case: &Case, plan: &Plan, found: &Searched, judged: Option<&Judged>) -> (Fit, Vec<Survey>) {
-    let mut fit = result(found, judged);
-    let surveys = surveys(case, plan, found);
-    fit.findings = findings(case, plan, found, &fit, &surveys);
-    (fit, surveys)
-}
 
 /// The complete result at a minimum.
 pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {

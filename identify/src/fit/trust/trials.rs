@@ -37,23 +37,6 @@ pub(crate) fn surveys(case: &Case, plan: &Plan, found: &Searched) -> Vec<Survey>
     logs.map(tested).collect()
 }
 
-/// True if a log holds the magnitude of a position or speed.
-pub(crate) fn is_magnitude(case: &Case, plan: &Plan, found: &Searched) -> bool {
-    let logs = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref());
-    let is_so = |log: &Arc<Log>| {
-        let notes = Survey::new(log, &case.machine).notes;
-        let mut remedies = notes.into_iter().filter_map(|note| note.remedy);
-        let folded = remedies.find(|remedy| matches!(remedy, Remedy::Magnitude(_)));
-        folded.is_some_and(|remedy| is_borne_out(case, plan, found, &log.name, &remedy))
-    };
-    logs.into_iter().any(is_so)
-}
-
-/// True if the input of a log was logged earlier or later than it acted.
-pub(crate) fn is_shifted(case: &Case, plan: &Plan, found: &Searched) -> bool {
-    found.problem.runs.iter().any(|run| shift(case, plan, found, &run.name).is_some())
-}
-
 /// An input logged earlier or later than it acted, by more than a plausible delay.
 fn shift(case: &Case, plan: &Plan, found: &Searched, name: &str) -> Option<Note> {
     if plan.closed_loop || found.problem.is_stopped() {

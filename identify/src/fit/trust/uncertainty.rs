@@ -11,6 +11,7 @@ use crate::fit::limits::NORMAL;
 use crate::fit::noise::{self, Slow, Spread, Wave, half_width};
 use crate::fit::search::triangle::inverse_of_square;
 use crate::log::Quantity;
+use crate::number::engineering_typed;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::TAU;
 
@@ -150,7 +151,7 @@ impl Judged {
     /// The autocorrelation of the residuals, in words.
     pub fn slow_words(&self, problem: &Problem) -> String {
         let quantities = problem.quantities();
-        let shown = |value: f64, unit| crate::number::engineering(value, unit, 2).replace('\u{a0}', " ");
+        let shown = |value: f64, unit| engineering_typed(value, unit, 2);
         let told_time = |slow: &Slow| match slow.frequency > 0.0 {
             true => format!("oscillations of {}", shown(slow.frequency / TAU, "Hz")),
             false => shown(slow.time, "s"),

@@ -361,20 +361,15 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         (seat.law, seat.reads) = (None, false);
     }
 
-    /// Takes up inputs that change at the end of the run, where the values after the change are seen, too; false as
-    /// [`Self::take_up`].
-    fn take_last_input(&mut self, lane: usize) -> bool {
-        if let Some(seat) = &mut self.seats[lane] {
-            seat.pieces = Pieces::of(&seat.experiment.inputs, seat.end);
-        }
-        self.take_input(lane);
+    /// Ends a run whose inputs changed at its end, where the values after the change are seen, too.
+    fn end_changed(&mut self, lane: usize) {
         if !self.take_up(lane) {
-            return false;
+            return self.give_up(lane);
         }
         if let Some(seat) = &mut self.seats[lane] {
             seat.see_values(seat.end);
         }
-        true
+        self.end_run(lane);
     }
 
     /// Brings a machine to where its lane can go on, or to the end of its runs.
@@ -392,16 +387,16 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             let length = seat.piece_end - core.common.base;
             if length - core.common.offset <= near {
                 core.count_from(seat.piece_end);
-                if seat.piece_end >= seat.end {
-                    let is_changed = seat.pieces.end <= seat.end;
-                    if is_changed && !self.take_last_input(lane) {
-                        return self.give_up(lane);
-                    }
+                let is_over = seat.piece_end >= seat.end;
+                if is_over && seat.pieces.end > seat.end {
                     return self.end_run(lane);
                 }
                 seat.pieces = Pieces::of(&seat.experiment.inputs, seat.piece_end);
                 seat.piece_end = seat.pieces.end.min(seat.end);
                 self.take_input(lane);
+                if is_over {
+                    return self.end_changed(lane);
+                }
                 continue;
             }
             if !self.take_up(lane) {
