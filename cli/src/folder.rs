@@ -1,7 +1,7 @@
 //! The folder of results. Its files are written in a hidden folder within it and get their places together, at the end;
 //! none takes the place of a file that the command reads.
 
-use crate::command::Common;
+use crate::common::Common;
 use crate::failure::Failure;
 use crate::listing::{self, Left, Listing};
 use crate::terminal;

@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod command;
+mod common;
 mod design;
 mod export;
 mod failure;

@@ -19,6 +19,10 @@ pub(crate) enum Log {
 pub(crate) type Logger2 = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
 pub(crate) type Logger3 = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
 
+/// Is called within a step of 3.0: environment, time, whether values can be set and read, whether the step is done,
+/// whether it can return early, whether it shall, and when.
+pub type IntermediateUpdate = unsafe extern "C" fn(*mut c_void, f64, bool, bool, bool, bool, *mut u8, *mut f64);
+
 /// An instance as importers hold it.
 pub struct Handle {
     pub(crate) instance: Instance,
@@ -30,7 +34,7 @@ pub struct Handle {
     /// States that were handed out and not freed yet.
     states: Vec<*mut Instance>,
     /// The callback of 3.0 at events within a step.
-    pub(crate) intermediate: Option<crate::fmi3::IntermediateUpdate>,
+    pub(crate) intermediate: Option<IntermediateUpdate>,
 }
 
 impl Handle {

@@ -1,6 +1,7 @@
 //! The functions of FMI 3.0, as the standard names them. Its booleans come in as bytes: what is not zero is true.
 #![allow(non_snake_case, missing_docs, clippy::missing_safety_doc, clippy::too_many_arguments)]
 
+pub use crate::abi::IntermediateUpdate;
 use crate::abi::{Handle, Log, Logger3, free, instantiate, put, room, slice, with};
 pub use crate::both::{
     fmi3DeserializeFMUState, fmi3ExitInitializationMode, fmi3FreeFMUState, fmi3GetContinuousStateDerivatives,
@@ -16,10 +17,6 @@ use std::ffi::{c_char, c_int, c_void};
 
 type Component = *mut c_void;
 type References = *const u32;
-
-/// Is called within a step: environment, time, whether values can be set and read, whether the step is done, whether it
-/// can return early, whether it shall, and when.
-pub type IntermediateUpdate = unsafe extern "C" fn(*mut c_void, f64, bool, bool, bool, bool, *mut u8, *mut f64);
 
 #[unsafe(no_mangle)]
 pub extern "C" fn fmi3GetVersion() -> *const c_char {

@@ -1,15 +1,10 @@
-//! Answers of taut about a case, by each of its interfaces.
+//! An answer of taut about a case, and that of its solvers.
 
-use crate::c;
 use crate::double::Double;
-use crate::exchange;
 use crate::law::Motion;
 use crate::machine::{BODIES, Model};
 use crate::solve::Event;
-use crate::steps;
 use crate::subject::{Fed, Subject};
-use crate::swept;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use taut::control::{self, Accuracy, Controller, Loop, Rows, Standard};
 use taut::mechanism::Mechanism;
 use taut::solve::{Course, Detail, Ending, ErrorEstimate, Flow, Outcome, Solver, stream, stream_mechanism};
@@ -20,56 +15,6 @@ pub const TOLERANCE: f64 = 1e-11;
 
 /// A difference that is none, whatever a run states: a hundredth of an atom's width.
 pub const LEAST: f64 = 1e-12;
-
-/// A way of asking taut.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum By {
-    /// The exact solver.
-    Exact,
-    /// The general one.
-    General,
-    /// An FMU for co-simulation.
-    CoSimulation,
-    /// An FMU for model exchange, with an integrator of the hunt.
-    ModelExchange,
-    /// Exported C, compiled by gcc.
-    C,
-    /// A row of a sweep.
-    Sweep,
-}
-
-impl By {
-    /// All of them.
-    pub const ALL: [By; 6] = [By::Exact, By::General, By::CoSimulation, By::ModelExchange, By::C, By::Sweep];
-
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            By::Exact => "exact solver",
-            By::General => "general solver",
-            By::CoSimulation => "FMU, co-simulation",
-            By::ModelExchange => "FMU, model exchange",
-            By::C => "C",
-            By::Sweep => "row of a sweep",
-        }
-    }
-
-    /// True if it is the general solver or answers by it where a machine has curves.
-    pub fn is_general(self, subject: &Subject) -> bool {
-        self == By::General || (self != By::Exact && self != By::C && !is_piecewise_linear(subject))
-    }
-
-    /// The tolerance of positions with which an integrator answers, m; `None` where an answer has only rounding.
-    pub fn tolerance(self, subject: &Subject) -> Option<f64> {
-        let Solver::General { tolerance } = Solver::GENERAL else { return None };
-        match self {
-            By::General => Some(TOLERANCE),
-            By::ModelExchange => Some(exchange::POSITIONS),
-            By::CoSimulation | By::Sweep if !is_piecewise_linear(subject) => Some(tolerance),
-            By::Exact | By::C | By::CoSimulation | By::Sweep => None,
-        }
-    }
-}
 
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq)]
@@ -103,19 +48,6 @@ pub struct Answer {
     pub is_stated: bool,
     /// Decisions within rounding that it names.
     pub ties: usize,
-}
-
-/// The answer to a subject. Errors: a refusal or a panic, in words.
-pub fn ask(subject: &Subject, by: By) -> Result<Answer, String> {
-    let asked = catch_unwind(AssertUnwindSafe(|| match by {
-        By::Exact => solved(subject, Solver::Exact),
-        By::General => solved(subject, Solver::General { tolerance: TOLERANCE }),
-        By::CoSimulation => steps::run(subject),
-        By::ModelExchange => exchange::run(subject),
-        By::C => c::run(subject),
-        By::Sweep => swept::run(subject),
-    }));
-    asked.unwrap_or_else(|_| Err("it panics".into()))
 }
 
 /// True if the machine of a subject is linear piece by piece.

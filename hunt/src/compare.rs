@@ -1,6 +1,7 @@
 //! One case by taut and by the independent solver: what they differ by, and whether that means something.
 
-use crate::answer::{self, Answer, By, End};
+use crate::answer::{Answer, End};
+use crate::by::{self, By};
 use crate::double::Double;
 use crate::draw::Random;
 use crate::events;
@@ -95,7 +96,7 @@ pub fn compare(name: &str, text: &str, ways: &[By], every: &[f64]) -> Vec<Compar
         for factor in std::iter::once(1.0).chain(others) {
             let [_, interval] = subject.times();
             let asked = if factor == 1.0 { subject.clone() } else { subject.clone().with_every(interval * factor) };
-            let one = match answer::ask(&asked, by) {
+            let one = match by::ask(&asked, by) {
                 Err(why) => fault(by, why),
                 Ok(answer) => {
                     let subject = answer.subject.clone().unwrap_or(asked);
@@ -315,7 +316,7 @@ mod tests {
         let text = crate::draw::stage(1, 0).text;
         let subject = Subject::new("stage.toml", &text).unwrap();
         let judged = |asked: &Subject| {
-            let answer = answer::solved(asked, Solver::Exact).unwrap();
+            let answer = crate::answer::solved(asked, Solver::Exact).unwrap();
             let known = subject.known_as_is(&answer.fed, &answer.times).unwrap();
             Pair { subject: &subject, by: By::Exact, answer: &answer, known: &known }.judged().verdict
         };

@@ -6,7 +6,7 @@
 
 use crate::double::{Double, ROUNDING};
 use crate::machine::{BODIES, SPANS, STATES};
-use crate::series::{ORDER, PLACES, Terms};
+use crate::terms::{ORDER, PLACES, Terms};
 
 /// Place of the curved part of the friction of each body.
 pub const FRICTION: [usize; BODIES] = [STATES, STATES + 1, STATES + 2, STATES + 3, STATES + 4];
@@ -273,7 +273,7 @@ impl Curved {
 mod tests {
     use super::*;
     use crate::machine::{BRISTLE, SPEED, WAY};
-    use crate::series::Terms;
+    use crate::terms::Terms;
 
     fn double(value: f64) -> Double {
         Double::from(value)

@@ -3,7 +3,7 @@
 use crate::double::{Double, PI};
 use crate::machine::Taken;
 use crate::root::Polynomial;
-use crate::series::ORDER;
+use crate::terms::ORDER;
 use taut::signal::Signal;
 
 /// A stretch of time.

@@ -6,6 +6,7 @@
 //! what is compared.
 
 pub mod answer;
+pub mod by;
 pub mod c;
 pub mod compare;
 pub mod curve;
@@ -28,3 +29,4 @@ pub mod stages;
 pub mod steps;
 pub mod subject;
 pub mod swept;
+pub mod terms;

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
-use taut_hunt::answer::By;
+use taut_hunt::by::By;
 use taut_hunt::compare::compare;
 use taut_hunt::draw;
 use taut_hunt::replay::{self, Tool};

@@ -1,7 +1,7 @@
 //! Where a polynomial on 0 to 1 first turns negative.
 
 use crate::double::Double;
-use crate::series::ORDER;
+use crate::terms::ORDER;
 
 /// Coefficients by rising powers.
 pub type Polynomial = [Double; ORDER + 1];

@@ -3,21 +3,13 @@
 
 use crate::curve::{Curved, Work};
 use crate::double::{Double, ROUNDING};
-use crate::machine::{BODIES, CURRENT, DRIVES, ROTOR, SPANS, STATES, State};
+use crate::machine::{BODIES, CURRENT, DRIVES, ROTOR, STATES, State};
 use crate::root::Polynomial;
+use crate::terms::{ORDER, PLACES, Terms};
 use std::ops::{Add, Mul, Neg, Sub};
-
-/// Order of the Taylor series.
-pub const ORDER: usize = 32;
-
-/// States, and the forces behind them that are no straight lines: friction of each body, each span.
-pub const PLACES: usize = STATES + BODIES + SPANS;
 
 /// Rounding of a state so far, as a share of the largest value that it had.
 const GATHERED: f64 = 1e-27;
-
-/// The terms of series of all places.
-pub type Terms = [[Double; PLACES]; ORDER + 1];
 
 /// A linear form of the state, curved forces, the inputs, and one.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -11,7 +11,8 @@ use crate::input::Piece;
 use crate::law::{Change, Guard, Law, Limit, Mode, Motion, Touch};
 use crate::machine::{BODIES, BRISTLE, CURRENT, DRIVES, Model, ROTOR, SPANS, SPEED, STATES, State, Taken, WAY};
 use crate::root::{self, Polynomial};
-use crate::series::{Noise, ORDER, PLACES, Series, Size};
+use crate::series::{Noise, Series, Size};
+use crate::terms::{ORDER, PLACES};
 use std::collections::HashMap;
 use std::rc::Rc;
 

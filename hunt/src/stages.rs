@@ -1,6 +1,6 @@
 //! The hunt over random stages: many of them on several threads, and the table of what came out.
 
-use crate::answer::By;
+use crate::by::By;
 use crate::compare::{Compared, Verdict, compare};
 use crate::draw::{self, Drawn, Feature, Kind};
 use serde_json::{Value, json};

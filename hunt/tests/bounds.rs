@@ -3,7 +3,7 @@
 
 use taut::case::Case;
 use taut::solve::{Solver, simulate};
-use taut_hunt::answer::By;
+use taut_hunt::by::By;
 use taut_hunt::compare::{Compared, Verdict, compare};
 use taut_hunt::draw::Random;
 

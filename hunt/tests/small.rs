@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-use taut_hunt::answer::{self, By};
+use taut_hunt::by::{self, By};
 use taut_hunt::compare::Verdict;
 use taut_hunt::draw::{self, Feature, Kind};
 use taut_hunt::machine::BODIES;
@@ -83,7 +83,7 @@ fn bristles_that_slip_ever_faster_are_followed_in_model_exchange() {
     // Rows of co-simulation are at the samples of the controller.
     let every = case.controller.as_ref().unwrap().every;
     let subject = subject.with_every(every);
-    let [exchange, steps] = [By::ModelExchange, By::CoSimulation].map(|by| answer::ask(&subject, by).unwrap());
+    let [exchange, steps] = [By::ModelExchange, By::CoSimulation].map(|by| by::ask(&subject, by).unwrap());
     assert_eq!(exchange.times.len(), steps.times.len());
     let farthest = steps.rows.iter().flatten().map(|way| way.high.abs()).fold(0.0, f64::max);
     let pairs = exchange.rows.iter().flatten().zip(steps.rows.iter().flatten());
@@ -180,7 +180,7 @@ fn nothing_is_unexplained_among_dual_belts() {
         let mut wrong = right.clone();
         let Subject::Gantry(case) = &mut wrong else { panic!("a dual belt is a gantry") };
         case.machine.cart.mass *= 1.001;
-        let answer = answer::ask(&right, By::General).ok()?;
+        let answer = by::ask(&right, By::General).ok()?;
         let apart = |subject: &Subject| {
             let known = subject.known_as_is(&answer.fed, &answer.times).ok()?.rows;
             let pairs = answer.rows.iter().flatten().zip(known.iter().flatten()).filter(|(a, _)| !a.high.is_nan());
@@ -207,7 +207,7 @@ fn a_wrong_answer_of_any_kind_is_unexplained() {
             continue;
         }
         let right = Subject::new("right.toml", &drawn.text).unwrap();
-        let Ok(answer) = answer::ask(&right, asked) else { continue };
+        let Ok(answer) = by::ask(&right, asked) else { continue };
         let right = answer.subject.clone().unwrap_or(right);
         let mut wrong = right.clone();
         match &mut wrong {

@@ -1,6 +1,6 @@
 //! `cargo xtask bad`: the wrong inputs of `tests/bad` as whole files, each with the message that it must give.
 
-use crate::python;
+use crate::host;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -17,7 +17,7 @@ pub fn run() -> Result<(), String> {
 /// Writes all of them into a folder that is made anew; paths in the cases lead to copies of the logs.
 pub fn write() -> Result<PathBuf, String> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("the project has no folder")?;
-    let new = python::target().join("tests");
+    let new = host::target().join("tests");
     let _ = fs::remove_dir_all(&new);
     copy(&root.join("tests/logs"), &new.join("logs"))?;
     for folder in ["log", "shape", "case", "mapping", "gantry"].map(|name| Path::new("bad").join(name)) {

@@ -37,7 +37,7 @@ pub fn beside_studio(program: &Path) -> Result<PathBuf, String> {
 
 fn make(program: &Path, has_studio: bool) -> Result<PathBuf, String> {
     let mdbook = installed("mdbook", VERSION, &["--no-default-features", "--features", "search"])?;
-    let folder = crate::python::target().join("book");
+    let folder = crate::host::target().join("book");
     let _ = fs::remove_dir_all(&folder);
     let pages = folder.join("docs");
     copy(Path::new("docs"), &pages)?;
@@ -82,7 +82,7 @@ fn built() -> Result<PathBuf, String> {
 
 /// A program from cargo's registry, in this version, under `target`; installed first, with these `options`, if missing.
 pub fn installed(name: &str, version: &str, options: &[&str]) -> Result<PathBuf, String> {
-    let root = crate::python::target().join(name);
+    let root = crate::host::target().join(name);
     let program = root.join("bin").join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     let mark = root.join("version.txt");
     if fs::read_to_string(&mark).is_ok_and(|there| there == version) && program.is_file() {

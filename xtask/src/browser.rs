@@ -1,6 +1,7 @@
 //! Reports in a browser: made with the program, opened and used in headless Chromium by `report/browser/check.mjs`; and
 //! the studio, by the scripts `studio*.mjs` beside it, and `web.mjs` without a server.
 
+use crate::host::{install, path_of};
 use crate::{Counts, web};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -61,7 +62,7 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
         Ok(browser) => browser,
         Err(needs) => return ignored(&needs, counts),
     };
-    let target = crate::python::target();
+    let target = crate::host::target();
     let (reports, shots) = (target.join("browser/reports"), target.join("browser/shots"));
     // A report of an earlier version must not be taken for this one.
     let _ = fs::remove_dir_all(target.join("browser"));
@@ -158,28 +159,6 @@ fn is_installed() -> bool {
     hashes.peek().is_some() && hashes.all(|hash| there.contains(hash.trim()))
 }
 
-/// Installs packages where Debian's installer is there and may be used.
-pub fn install(packages: &[&str]) {
-    if path_of("apt-get").is_none() || !is_root() {
-        return;
-    }
-    let did = |words: &[&str]| {
-        let mut command = Command::new("apt-get");
-        command.args(words).env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null());
-        command.status().is_ok_and(|status| status.success())
-    };
-    let install = [&["install", "--yes", "--quiet", "--no-install-recommends"], packages].concat();
-    // Lists that are older than what they list name packages that cannot be had together any more.
-    if !did(&install) && did(&["update", "--quiet"]) {
-        did(&install);
-    }
-}
-
-fn is_root() -> bool {
-    let answer = Command::new("id").arg("-u").output();
-    answer.is_ok_and(|answer| answer.stdout.trim_ascii() == b"0")
-}
-
 fn answers(program: &str) -> bool {
     Command::new(program)
         .arg("--version")
@@ -192,12 +171,6 @@ fn answers(program: &str) -> bool {
 fn node_is_new_enough() -> bool {
     let test = "process.exit(Number(process.versions.node.split('.')[0]) < 20 ? 1 : 0)";
     answers("npm") && Command::new("node").args(["--eval", test]).status().is_ok_and(|status| status.success())
-}
-
-/// Where a program is.
-pub fn path_of(program: &str) -> Option<PathBuf> {
-    let paths = std::env::var_os("PATH")?;
-    std::env::split_paths(&paths).map(|folder| folder.join(program)).find(|path| path.is_file())
 }
 
 /// Counts the tests as ignored, by name; or fails where all are required.

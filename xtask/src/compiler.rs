@@ -2,7 +2,7 @@
 //! for browsers, which has LLVM for all processors and the source of the library, is unpacked under `target/web`,
 //! without being installed; cargo then compiles the library too.
 
-use crate::{browser, python, succeeds};
+use crate::{host, succeeds};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -47,7 +47,7 @@ pub fn find(target: &str) -> Result<Compiler, String> {
     if rustup.is_ok_and(|rustup| succeeds_within(PATIENCE, rustup)) && has_target(target) {
         return Ok(Compiler::Own);
     }
-    if browser::path_of("apt-get").is_some() && unpack(&debian()).is_ok() && answers(&debian()) {
+    if host::path_of("apt-get").is_some() && unpack(&debian()).is_ok() && answers(&debian()) {
         return Ok(Compiler::Debian(debian()));
     }
     Err(missing)
@@ -69,7 +69,7 @@ fn is_known(target: &str) -> bool {
 
 /// The folder of Debian's compiler.
 fn debian() -> PathBuf {
-    python::target().join("web/debian/root")
+    host::target().join("web/debian/root")
 }
 
 /// True if the compiler of the project has the standard library of a target.

@@ -1,7 +1,7 @@
 //! The tools that exported machines are run in: compilers, an emulator, Octave, and a Python environment under
 //! `target/export`. Where something is missing and cannot be installed, the tests that need it are counted as ignored.
 
-use crate::browser::{install, path_of};
+use crate::host::{install, path_of};
 
 /// Programs, and the packages of Debian that have them.
 const PROGRAMS: [(&str, &str); 8] = [

@@ -13,7 +13,7 @@ pub struct Ignored(PathBuf);
 impl Ignored {
     /// An empty one.
     pub fn new() -> Result<Self, String> {
-        let folder = crate::python::target();
+        let folder = crate::host::target();
         let file = folder.join(format!("ignored-{}.txt", std::process::id()));
         fs::create_dir_all(&folder)
             .and_then(|()| fs::write(&file, ""))

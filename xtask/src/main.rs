@@ -16,6 +16,7 @@ mod counts;
 mod data;
 mod export;
 mod fmu;
+mod host;
 mod hunt;
 mod ignored;
 mod package;
@@ -263,7 +264,7 @@ fn build_program(counts: &mut Counts) -> Result<Option<PathBuf>, String> {
 
 /// Where a debug build puts the program `taut`.
 fn program() -> PathBuf {
-    python::target().join("debug").join(format!("taut{}", std::env::consts::EXE_SUFFIX))
+    host::target().join("debug").join(format!("taut{}", std::env::consts::EXE_SUFFIX))
 }
 
 /// Tests that ran, summed over all programs of tests.

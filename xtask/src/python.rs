@@ -1,7 +1,7 @@
 //! The Python package: built as a wheel, installed into an environment of its own under `target/python`, and tested
 //! there.
 
-use crate::Counts;
+use crate::{Counts, host};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -15,7 +15,7 @@ const OLDEST: (u32, u32) = (3, 10);
 pub fn test(counts: &mut Counts) -> Result<bool, String> {
     let environment = environment("python", REQUIREMENTS)?;
     let python = program(&environment, "python");
-    let target = target();
+    let target = host::target();
     let wheels = target.join("wheels");
     // A wheel of an earlier version must not be taken for this one.
     let _ = std::fs::remove_dir_all(&wheels);
@@ -49,7 +49,7 @@ pub fn test(counts: &mut Counts) -> Result<bool, String> {
 
 /// The environment of this name with everything in it that a file of requirements names.
 pub fn environment(name: &str, requirements: &str) -> Result<PathBuf, String> {
-    let folder = target().join(name);
+    let folder = host::target().join(name);
     let wanted = std::fs::read_to_string(requirements).map_err(|e| format!("{requirements} cannot be read: {e}"))?;
     let installed = folder.join("installed.txt");
     if std::fs::read_to_string(&installed).is_ok_and(|there| there == wanted) {
@@ -99,10 +99,4 @@ pub fn is_new_enough(name: &str) -> Result<(), String> {
 pub fn program(environment: &Path, name: &str) -> PathBuf {
     let folder = if cfg!(windows) { "Scripts" } else { "bin" };
     environment.join(folder).join(format!("{name}{}", std::env::consts::EXE_SUFFIX))
-}
-
-/// Where cargo builds.
-pub fn target() -> PathBuf {
-    let given = std::env::var_os("CARGO_TARGET_DIR").map(PathBuf::from);
-    std::path::absolute(given.unwrap_or_else(|| "target".into())).unwrap_or_else(|_| "target".into())
 }

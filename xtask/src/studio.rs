@@ -2,7 +2,7 @@
 //! way from an empty page to a fitted model: all with the program as it is released, by the scripts of
 //! `report/browser`.
 
-use crate::{browser, cargo, python, web};
+use crate::{browser, cargo, host, web};
 use std::path::Path;
 use std::process::Command;
 
@@ -58,7 +58,7 @@ fn finish(node: Command, words: &[&str]) -> Result<(), String> {
     if !built.is_ok_and(|status| status.success()) {
         return Err("the program cannot be built".into());
     }
-    let taut = python::target().join("release").join(format!("taut{}", std::env::consts::EXE_SUFFIX));
+    let taut = host::target().join("release").join(format!("taut{}", std::env::consts::EXE_SUFFIX));
     measure(node, &taut, words)
 }
 

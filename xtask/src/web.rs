@@ -4,7 +4,7 @@
 //! Compiling the module requires a compiler for `wasm32-unknown-unknown`.
 
 use crate::compiler::{self, Compiler};
-use crate::{book, browser, package, python, succeeds};
+use crate::{book, host, package, succeeds};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -32,7 +32,7 @@ pub fn run(words: &[&str]) -> Result<(), String> {
 
 /// The folder without `--out`.
 pub fn default_folder() -> PathBuf {
-    python::target().join("web").join("page")
+    host::target().join("web").join("page")
 }
 
 /// Makes the folder, and with it the program `taut`, and returns the size of the module, bytes.
@@ -45,7 +45,7 @@ pub fn make(folder: &Path, compiler: &Compiler) -> Result<u64, String> {
     if !succeeds(&mut crate::cargo(&all))? {
         return Err("the programs that write page and book were not built".into());
     }
-    let example = python::target().join("debug/examples").join(format!("folder{}", std::env::consts::EXE_SUFFIX));
+    let example = host::target().join("debug/examples").join(format!("folder{}", std::env::consts::EXE_SUFFIX));
     if !succeeds(Command::new(example).arg(folder))? {
         return Err("the files of the page were not written".into());
     }
@@ -71,7 +71,7 @@ fn module(compiler: &Compiler) -> Result<PathBuf, String> {
 
 /// The folder in which cargo builds the module.
 fn build_folder() -> PathBuf {
-    python::target().join("web").join("build")
+    host::target().join("web").join("build")
 }
 
 /// The module in that folder.
@@ -92,7 +92,7 @@ fn linker() -> Result<PathBuf, String> {
     let folder = Command::new("rustc").args(["--print", "target-libdir"]).output();
     let folder = folder.map(|answer| String::from_utf8_lossy(&answer.stdout).trim().to_string()).unwrap_or_default();
     let own = Path::new(&folder).with_file_name("bin").join("rust-lld");
-    let found = Some(own).filter(|own| own.is_file()).or_else(|| browser::path_of("wasm-ld"));
+    let found = Some(own).filter(|own| own.is_file()).or_else(|| host::path_of("wasm-ld"));
     found.ok_or_else(|| "rust-lld, which comes with Rust of rustup, or wasm-ld (Debian: apt-get install lld)".into())
 }
 

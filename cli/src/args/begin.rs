@@ -1,6 +1,6 @@
 //! The paper, the beginning of a case, the studio, and what the program tells of itself.
 
-use crate::command::Common;
+use crate::common::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
 

@@ -1,7 +1,7 @@
 //! `export`.
 
 use super::values::{metres, seconds};
-use crate::command::Common;
+use crate::common::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
 

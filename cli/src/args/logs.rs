@@ -1,7 +1,7 @@
 //! Logs: `check`, `fit`, `frf`, and the experiment to make next, `design`.
 
 use super::values::{amperes, channel, count, count_or_none, delay, length, metres, seconds, seed, share};
-use crate::command::Common;
+use crate::common::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
 use taut::fit::experiment_design::{Criterion, Kind as InputKind, VERIFIED};

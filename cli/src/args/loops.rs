@@ -4,7 +4,7 @@ use super::values::{
     Shapers, acceleration, corner_speed, damping, delay, effort, hertz, jerk, metre_unit, metres, metres_per_second,
     reserve, seconds, shapers, share, smoothing, speed, uncertainty, vibrations,
 };
-use crate::command::Common;
+use crate::common::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
 use taut::control::recommendation::Damping;

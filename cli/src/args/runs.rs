@@ -1,7 +1,7 @@
 //! Runs: `simulate`, `move`, `sweep`.
 
 use super::values::{count, seed, share, step};
-use crate::command::Common;
+use crate::common::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
 use taut::machine::Machine;

@@ -3,7 +3,8 @@
 mod fmu;
 
 use crate::args::{Export as Args, PartName, RealName, TargetName};
-use crate::command::{self, Finished};
+use crate::command::Finished;
+use crate::common;
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::terminal;
@@ -48,7 +49,7 @@ pub fn run(args: &Args) -> Outcome {
         TargetName::Fmu | TargetName::Json => common.open_for(path, Files::All)?,
         _ => common.open_motors_for(path, Files::All)?,
     };
-    let own = match command::is_standard_input(path) {
+    let own = match common::is_standard_input(path) {
         true => "axis".to_string(),
         false => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
     };

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use std::time::Duration;
 use taut::case::Case;
 use taut::number;
-use taut_report::fit::{Found, crooked, ending, findings, past_kinks, plain, scores, value, words};
+use taut_report::fit::{Found, crooked, ending, findings, past_kinks, scores, value, words};
 
 /// The text on the terminal.
 pub fn text(case: &Case, found: &Found, took: Duration) -> String {
@@ -72,7 +72,7 @@ pub fn text(case: &Case, found: &Found, took: Duration) -> String {
         fit.work.iterations,
         fit.work.simulations,
         past_kinks(fit),
-        plain(&number::engineering(took.as_secs_f64(), "s", 3)),
+        number::engineering_typed(took.as_secs_f64(), "s", 3),
     );
     text
 }

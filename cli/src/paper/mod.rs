@@ -20,7 +20,8 @@ mod tables;
 mod words;
 
 use crate::args::Paper;
-use crate::command::{Common, Finished, Report};
+use crate::command::{Finished, Report};
+use crate::common::Common;
 use crate::failure::{Failure, Outcome};
 use crate::folder::Folder;
 use claims::{Claim, Kind, Verdict};

@@ -1,6 +1,6 @@
 //! Runs of the machines drawn from a posterior: the band that 95 % of them stay in, at every time for itself.
 
-use super::run::Setting;
+use super::setting::Setting;
 use rayon::prelude::*;
 use taut::case::Experiment;
 use taut::chance::quantile;

@@ -3,6 +3,7 @@
 mod band;
 mod rows;
 mod run;
+mod setting;
 mod table;
 
 use crate::args::{Format, Simulate};
@@ -11,7 +12,7 @@ use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use crate::terminal;
-use run::Setting;
+use setting::Setting;
 use std::ffi::OsString;
 use std::path::Path;
 use taut::case::{Case, Files};

@@ -2,33 +2,20 @@
 
 use super::band;
 use super::rows::writers;
-use crate::args::Simulate;
+use super::setting::Setting;
 use crate::failure::Failure;
 use crate::folder::Folder;
-use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use std::time::Instant;
 use taut::Error;
 use taut::case::{Case, Experiment};
 use taut::fit::beside_log;
-use taut::machine::Machine;
 use taut::measure;
 use taut::metrics::Meter;
 use taut::reduction::Reduction;
 use taut::solve::{self, ErrorEstimate, Flow, Solver};
 use taut::trajectory::{CsvWriter, Trajectory};
 use taut_report::simulate::{Curves, Run, Samples};
-
-/// Settings that all runs of a command share.
-pub struct Setting<'a> {
-    pub args: &'a Simulate,
-    pub case: &'a Case,
-    pub solver: Solver,
-    pub folder: Option<&'a Folder>,
-    pub interrupt: &'a Interrupt,
-    /// Machines drawn from a posterior.
-    pub machines: &'a [Machine],
-}
 
 impl<'a> Setting<'a> {
     /// Runs `experiment`.

@@ -7,6 +7,7 @@ mod store;
 mod summary;
 mod table;
 mod trajectories;
+mod writer;
 
 use crate::args::Sweep as Args;
 use crate::command::{Finished, Report};

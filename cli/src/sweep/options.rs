@@ -1,7 +1,7 @@
 //! From the command line to changes of the case, and to where results go.
 
 use crate::args::Sweep as Args;
-use crate::command::Common;
+use crate::common::Common;
 use crate::failure::Failure;
 use crate::folder::{self, Folder, Target};
 use std::path::{Path, PathBuf};

@@ -2,14 +2,12 @@
 
 use super::options::{self, trajectories};
 use super::store::Store;
+use super::writer::Writer;
 use super::{Work, trajectories};
 use crate::failure::Failure;
 use crate::folder::Target;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use taut::Result;
-#[cfg(feature = "parquet")]
-use taut::trajectory::ParquetWriter;
-use taut::trajectory::{CsvWriter, Trajectory};
 
 /// Writes the rows and what is written beside them; returns the names of those that have their places, or none where it
 /// was interrupted.
@@ -48,42 +46,4 @@ fn tables(work: &Work, store: &Store, files: &[PathBuf]) -> Result<Option<Vec<Wr
         }
     }
     Ok(Some(writers))
-}
-
-/// A file of rows.
-pub enum Writer {
-    Csv(CsvWriter),
-    #[cfg(feature = "parquet")]
-    Parquet(Box<ParquetWriter>),
-}
-
-impl Writer {
-    /// Begins the file `path`, in the form that its ending says.
-    fn create(path: &Path) -> Result<Self> {
-        match path.extension() {
-            #[cfg(feature = "parquet")]
-            Some(ending) if ending.eq_ignore_ascii_case("parquet") => {
-                ParquetWriter::create(path).map(|writer| Self::Parquet(Box::new(writer)))
-            }
-            _ => CsvWriter::create(path).map(Self::Csv),
-        }
-    }
-
-    /// Adds rows.
-    pub fn write(&mut self, table: &Trajectory) -> Result<()> {
-        match self {
-            Self::Csv(writer) => writer.write(table),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(writer) => writer.write(table),
-        }
-    }
-
-    /// Gives it its name.
-    fn finish(self) -> Result<()> {
-        match self {
-            Self::Csv(writer) => writer.finish(),
-            #[cfg(feature = "parquet")]
-            Self::Parquet(writer) => writer.finish(),
-        }
-    }
 }

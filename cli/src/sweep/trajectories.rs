@@ -1,7 +1,7 @@
 //! Every quantity over time of every run, in one file.
 
 use super::Work;
-use super::output::Writer;
+use super::writer::Writer;
 use taut::solve::Flow;
 use taut::sweep::Sweep;
 use taut::trajectory::{Column, Trajectory};

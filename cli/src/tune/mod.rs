@@ -3,7 +3,8 @@
 mod table;
 
 use crate::args::Tune as Args;
-use crate::command::{self, Finished, Remark, Report};
+use crate::command::{Finished, Remark, Report};
+use crate::common;
 use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Target, files_of};
 use crate::interrupt::{Interrupt, interrupted};
@@ -111,7 +112,7 @@ fn tuning(args: &Args, case: &Case) -> Tuning {
 /// Where to write; never over a file that is read, unless that is asked for.
 fn target(args: &Args, case: &Case) -> std::result::Result<Target, Failure> {
     if args.in_place {
-        if command::is_standard_input(&args.case) {
+        if common::is_standard_input(&args.case) {
             let error = Error::new("standard input cannot be written to").in_file("--in-place");
             return Err(error.next("name a file: --out FILE.toml").into());
         }

@@ -1,7 +1,7 @@
 //! Features of a case, which of them go together, and recipes in which each pair that can occur does so.
 
 use super::Random;
-use crate::answer::By;
+use crate::by::By;
 
 /// A feature of a case, or a way of asking about it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -2,7 +2,7 @@
 
 use super::machine::Scale;
 use super::{Draw, Feature, Sizes};
-use crate::answer::By;
+use crate::by::By;
 use std::fmt::Write;
 
 impl Draw {

@@ -1,7 +1,7 @@
 //! Motor, amplifier, bodies, belt and travel of a random stage.
 
 use super::{Draw, Feature, Kind, Random, Sizes};
-use crate::answer::By;
+use crate::by::By;
 use std::f64::consts::PI;
 use std::fmt::Write;
 

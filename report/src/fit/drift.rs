@@ -1,6 +1,6 @@
 //! Single changes that explain the logs, in words and as a page.
 
-use super::rows::value;
+use super::value::value;
 use crate::{Cell, Page, Table};
 use taut::case::Case;
 use taut::fit::{Change, Drift, Together};

@@ -6,9 +6,11 @@ mod page;
 mod plots;
 pub mod posterior;
 mod rows;
+mod value;
 
 pub use page::{page, page_with};
-pub use rows::{crooked, ending, findings, outputs, past_kinks, plain, scores, value, words};
+pub use rows::{crooked, ending, findings, outputs, past_kinks, scores, words};
+pub use value::value;
 
 use taut::fit::{Fit, Posterior, Profile};
 

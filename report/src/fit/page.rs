@@ -1,6 +1,6 @@
 //! The report: one HTML file.
 
-use super::{Found, plots, posterior, rows as told};
+use super::{Found, plots, posterior, rows as told, value};
 use crate::{Callout, Cell, Page, Table};
 use taut::case::Case;
 use taut::fit::{Fit, Grade, LogFit, Profile, ResidualForce, Score, residual_force};
@@ -74,7 +74,7 @@ fn parameters(page: &mut Page, fit: &Fit) {
     }
     for estimate in &fit.estimates {
         let [value, error, interval] = told::words(estimate);
-        let start = told::value(estimate.start, estimate.unit, 5);
+        let start = value::value(estimate.start, estimate.unit, 5);
         rows.row([estimate.name.clone(), value, error, interval, start].map(Cell::from));
     }
     page.table(&rows);

@@ -1,5 +1,6 @@
 //! Model and log side by side.
 
+use super::value::value;
 use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use taut::fit::{Estimate, Fit, LogFit, OutputFit, Posterior, Profile, ResidualForce};
 use taut::log::{Quantity, step_of};
@@ -99,7 +100,7 @@ pub fn overlay(log: &LogFit, output: &OutputFit, noise: &[(Quantity, f64)]) -> F
         None => "Above log and model, below what is between them.".to_string(),
         Some(step) => format!(
             "Above log and model, below what is between them: mostly the rounding of the log to steps of {}.",
-            super::rows::value(step, output.quantity.unit(), 3)
+            value(step, output.quantity.unit(), 3)
         ),
     };
     let name = output.quantity.name().replace('_', " ");

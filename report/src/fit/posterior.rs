@@ -1,7 +1,7 @@
 //! Draws from the posterior, in words and as a section of the report.
 
 use super::plots::histogram;
-use super::rows::value;
+use super::value::value;
 use crate::{Callout, Cell, Page, Table};
 use taut::fit::{Credible, Fit, Posterior};
 

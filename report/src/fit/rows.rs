@@ -1,9 +1,9 @@
 //! A fit in words.
 
 use super::plots;
+use super::value::value;
 use std::fmt::Write;
 use taut::fit::{Ending, Estimate, Finding, Fit, LogFit, Profile, Score, Together, together};
-use taut::number;
 
 /// Findings of one kind in so many logs are told of the first.
 const MOST_ALIKE: usize = 3;
@@ -73,34 +73,6 @@ pub fn ending(fit: &Fit) -> String {
         let _ = write!(text, "; {same} of {} starts led to the same cost", fit.starts.len());
     }
     text
-}
-
-/// Text with spaces as they are typed.
-pub fn plain(text: &str) -> String {
-    text.replace(['\u{a0}', '\u{202f}'], " ").replace('−', "-")
-}
-
-/// A number with its unit and as many digits as make sense.
-pub fn value(value: f64, unit: &str, digits: usize) -> String {
-    match unit {
-        _ if value == 0.0 => format!("0 {unit}").trim().to_string(),
-        // Prefixes where the unit takes one.
-        "m" | "s" | "N" | "V" | "A" | "H" | "rad" | "N m" | "m/s" | "rad/s" => {
-            plain(&number::engineering(value, unit, digits))
-        }
-        "" => taut::quantity::rounded(value),
-        _ => format!("{} {unit}", significant(value, digits)),
-    }
-}
-
-fn significant(value: f64, digits: usize) -> String {
-    let size = value.abs();
-    if (1e-3..1e5).contains(&size) {
-        let decimals = (digits as i32 - 1 - size.log10().floor() as i32).max(0) as usize;
-        format!("{value:.decimals$}")
-    } else {
-        format!("{value:.*e}", digits - 1)
-    }
 }
 
 /// Value, standard error and interval of an estimate.

@@ -47,7 +47,7 @@ fn taut(program: &Path, words: &[&str]) -> Result<String, String> {
 
 /// A header as `taut export c` writes it.
 fn header(program: &Path) -> Result<String, String> {
-    let file = crate::python::target().join("book/axis.c");
+    let file = crate::host::target().join("book/axis.c");
     taut(program, &["export", "c", EXPORTED, "--out", &file.display().to_string()])?;
     Ok(format!("```c\n{}```\n", super::read(&file.with_extension("h"))?))
 }

@@ -23,7 +23,7 @@ pub fn make(places: &Places, claims: &mut Claims) -> Result<Program, String> {
         pack.args(["--exclude", name]);
     }
     must(pack)?;
-    let packed = crate::python::target().join("package");
+    let packed = crate::host::target().join("package");
     let registry = places.work.join("registry");
     let _ = fs::remove_dir_all(&registry);
     // All that the workspace needs of others, and our own crates beside it.

@@ -18,7 +18,7 @@ mod program;
 mod trial;
 mod wheel;
 
-use crate::{Counts, compiler, output, python, write};
+use crate::{Counts, compiler, host, output, python, write};
 use serde_json::Value;
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -99,7 +99,7 @@ pub fn run(words: &[&str]) -> Result<(), String> {
     if asked.twice {
         committed()?;
     }
-    let target = python::target();
+    let target = host::target();
     let work = target.join("package-work");
     if asked.fresh {
         let _ = fs::remove_dir_all(&work);

@@ -13,7 +13,7 @@ pub fn flags(source: &Path) -> Result<Vec<String>, String> {
 pub fn check(file: &Path) -> Result<Vec<u8>, String> {
     let bytes = read(file)?;
     let mut paths: Vec<PathBuf> = folders(Path::new("."))?.into_iter().map(|(folder, _)| folder).collect();
-    paths.push(crate::python::target());
+    paths.push(crate::host::target());
     let found = held(&bytes, &paths);
     match &found[..] {
         [] => Ok(bytes),
