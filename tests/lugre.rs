@@ -11,6 +11,7 @@
 //! the cart. The dragged mass has span 1 as its spring, and a drive pulley too heavy to be slowed as the end that
 //! moves.
 
+use crate::common::chance::Chance;
 use serde_json::Value;
 use taut::case::Case;
 use taut::machine::BeltModel;
@@ -237,4 +238,49 @@ fn along_scales_what_bristles_hold_and_not_how_stiff_they_are() {
     println!("along with lugre: {defined:.1e} m; on the force {force:.1e} m; on both {both:.1e} m");
     assert!(defined < 1e-8, "{defined:e} m from the equations of the document");
     assert!(force > 1e-5 && both > 1e-5, "{force:e} m and {both:e} m: this case does not tell the readings apart");
+}
+
+/// An oscillation on bristles never ends in numbers. Where it is small enough, bodies count as at rest until the input
+/// changes: machines drawn at random go where they do under an input that never stands still, though by 1e-9 V alone.
+#[test]
+fn small_oscillations_on_bristles_end() {
+    let mut chance = Chance::new(61);
+    let mut between = |low: f64, high: f64| low + (high - low) * chance.uniform();
+    for seed in 0..12 {
+        let (stiffness, damping) =
+            (10f64.powf(between(5.0, 7.0)), if seed % 2 == 0 { 0.0 } else { between(5.0, 80.0) });
+        let (coulomb, viscous, volts) = (between(0.1, 1.5), between(5.0, 30.0), between(2.0, 8.0));
+        let pulley = match seed % 3 {
+            // Every body on bristles, one of them, pulleys that stick.
+            0 => "coulomb = 0.01, static = 0.013, lugre = { stiffness = 50.0, damping = 0.01, velocity = 0.5 }",
+            _ => "coulomb = 0.015",
+        };
+        let case = |input: &str| {
+            let text = format!(
+                "[motor]\ntorque_constant = 0.023\nback_emf_constant = 0.023\nresistance = 0.71\ninductance = {:e}\n\
+                 [drive_pulley]\nradius = 0.0194\ninertia = 6.3e-5\nfriction = {{ viscous = 0.0016, {pulley} }}\n\
+                 [idler_pulley]\ninertia = 6.3e-5\nfriction = {{ viscous = 0.0016, {pulley} }}\n[cart]\nmass = 0.362\n\
+                 friction = {{ viscous = {viscous:e}, coulomb = {coulomb:e}, static = {:e}, lugre = {{ stiffness = \
+                 {stiffness:e}, damping = {damping:e}, velocity = 0.01 }} }}\n[belt]\nstiffness = [1.3e5, 1.3e5, 5.9e4]\n\
+                 [[experiment]]\nname = \"pulse\"\nuntil = 2.0\nevery = 1e-3\ninput = {{ sequence = [{{ step = {volts:e}, \
+                 lasts = 0.2 }}, {input}] }}\n",
+                if seed % 4 == 3 { 5e-4 } else { 0.0 },
+                1.3 * coulomb,
+            );
+            let case = Case::from_text("bristles.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+            let solution = simulate(&case.machine, &case.experiments[0], Solver::GENERAL).unwrap();
+            assert_eq!(solution.outcome.ending, Ending::Complete);
+            solution
+        };
+        let (ends, never) = (case("{ step = 0.0 }"), case("{ ramp = 1e-9, over = 2.0 }"));
+        for name in ["drive_angle", "cart_position", "idler_angle"] {
+            let both = ends.trajectory.get(name).unwrap().iter().zip(never.trajectory.get(name).unwrap());
+            let off = both.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            let lever = if name == "cart_position" { 1.0 } else { 0.0194 };
+            assert!(off * lever < 2e-10, "{seed}: {name} differs by {:e} m", off * lever);
+        }
+        let steps = [&ends, &never].map(|solution| solution.outcome.cost.steps);
+        println!("{seed}: {steps:?} steps");
+        assert!(3 * steps[0] < 2 * steps[1], "{seed}: {steps:?} steps");
+    }
 }

@@ -1,5 +1,6 @@
 //! A mode made ready: its linear part, the forces beyond it, and its guards.
 
+use super::calm::Calm;
 use super::linear::{Linear, Output, STATES, States};
 use super::model::{MOST_GUARDS, Model, Vector};
 use super::sources::{Argument, Phasing, SOURCES, Source};
@@ -33,6 +34,8 @@ pub(super) struct Field {
     pub(super) shifted: bool,
     /// Inertia that moves with each body, per unit of its leader's position.
     mass: [f64; BODIES],
+    /// The bodies that bristles hold, if nothing else moves.
+    pub(super) calm: Option<Calm>,
 }
 
 impl Field {
@@ -85,10 +88,12 @@ impl Field {
             measured: Vec::new(),
             shifted: false,
             mass,
+            calm: None,
         };
         field.linear.inputs = mechanism.drives.len();
         field.add_sources();
         field.add_outputs();
+        field.calm = Calm::of((model, mode), &field.sources, &field.equations, &field.mass);
         field
     }
 

@@ -7,6 +7,7 @@
 //! crossings within a step are detected. A step with an event is repeated up to the event.
 
 mod bristles;
+mod calm;
 mod change;
 mod dynamics;
 mod fall;

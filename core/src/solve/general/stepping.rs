@@ -106,11 +106,25 @@ impl Core {
                 self.tau = stretch.length();
                 break;
             }
+            if self.comes_to_rest(&field, &stretch) {
+                self.rest(&stretch, witness);
+                break;
+            }
             hit = self.step(&field, &stretch, &mut room, &mut guess, witness);
         }
         self.cost.evaluations += room.evaluations - evaluations;
         self.room = Some(room);
         hit
+    }
+
+    /// Stays where it is until the end of the stretch.
+    fn rest(&mut self, stretch: &Stretch, witness: &mut dyn Witness) {
+        let (begin, from, until) = (self.y, self.tau, stretch.length());
+        self.cost.steps += 1;
+        self.rules.since_change += until - from;
+        let way = Way { stretch, from, until, to: until, begin: &begin, rests: true, dense: &|_| begin };
+        witness.see(self, &way);
+        self.tau = until;
     }
 
     /// Takes one step; the guard that fell in it, if one did.
