@@ -15,6 +15,8 @@ mod machines;
 mod requests;
 #[path = "export/st.rs"]
 mod st;
+#[path = "export/steppers.rs"]
+mod steppers;
 #[path = "export/together.rs"]
 mod together;
 #[path = "export/tools.rs"]

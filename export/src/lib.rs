@@ -163,7 +163,7 @@ pub fn part(case: &Case, asked: Option<Part>) -> Result<Part> {
     });
     if part.has_controller() {
         // C takes no curves.
-        let instead = match mechanism(case).is_piecewise_linear() {
+        let instead = match mechanism(case).is_piecewise_linear() || case.machine.stepper().is_some() {
             true => "leave --part out for the machine alone",
             false => "take the machine with `taut export fmu`",
         };
@@ -196,7 +196,9 @@ fn shaper_remark(design: &crate::design::Design) -> Vec<String> {
 
 /// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.
 pub fn export(case: &Case, target: Target, stem: &str, options: &Options) -> Result<Exported> {
-    crate::case::needs_motors(&case.machine)?;
+    if target != Target::C {
+        crate::case::needs_motors(&case.machine)?;
+    }
     let has_plant = match target {
         Target::C => part(case, options.part)?.has_plant(),
         Target::StructuredText => false,

@@ -9,12 +9,14 @@
 //! motion and on the springs and the drive at it alone, so that the rows of a machine are a hundred, not thousands.
 
 mod maker;
+mod phases;
 
 use crate::error::{Error, Result};
 use crate::friction::Motion;
 use crate::mechanism::{self, Cause, Contact, Form, Layout, Limit, Mechanism, Mode, Next, SpringLaw, State, Status};
 use crate::mechanism::{Switch, What};
 use maker::Maker;
+pub use phases::Stepped;
 
 /// A part that can do several things.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,6 +40,8 @@ pub enum ElementKind {
     Voltage(usize),
     /// Its current limit.
     Current(usize),
+    /// The voltage limit of a stepper's phase: drive and phase.
+    Phase(usize, usize),
     /// A spring that only pulls.
     Span(usize),
     /// A spring that only pushes.
@@ -159,6 +163,10 @@ pub struct Tables {
     pub guards: Vec<TableGuard>,
     /// Number of their tolerances.
     pub slots: usize,
+    /// The places in z of the factors of each product behind the states; a factor is a state or an earlier product.
+    pub products: Vec<[usize; 2]>,
+    /// Steppers, by drives; none of other machines.
+    pub steppers: Vec<Stepped>,
     /// Currents of the drives, A.
     pub currents: Vec<Row>,
     /// Voltages at the motors, V.
@@ -230,6 +238,8 @@ impl Tables {
             states,
             guards,
             slots,
+            products: Vec::new(),
+            steppers: Vec::new(),
             currents,
             voltages,
             forces,
@@ -239,9 +249,9 @@ impl Tables {
         })
     }
 
-    /// Number of places of z: states, inputs and a one.
+    /// Number of places of z: states, products, inputs and a one.
     pub fn size(&self) -> usize {
-        self.layout.states + self.layout.inputs + 1
+        self.layout.states + self.products.len() + self.layout.inputs + 1
     }
 
     /// Adds the rows of one more quantity, and says where among the [others](Self::others) they stand.
@@ -346,6 +356,8 @@ impl ElementKind {
             ElementKind::GearTorque(drive) => Does::Torque(mode.drive[drive].torque_positive),
             ElementKind::Voltage(drive) => Does::Limits(mode.drive[drive].voltage),
             ElementKind::Current(drive) => Does::Limits(mode.drive[drive].current),
+            // Modes do not have it: at rest the phases are within their supply.
+            ElementKind::Phase(..) => Does::Limits(Limit::Inside),
             ElementKind::Span(spring) => Does::Slack(mode.slack[spring]),
             ElementKind::Gap(spring) => Does::Touches(mode.contact[spring]),
             ElementKind::Line(spring) => Does::Follows(mode.piece[spring]),
@@ -368,7 +380,7 @@ impl ElementKind {
     pub fn what(self) -> Option<What> {
         match self {
             ElementKind::Body(body) => Some(What::Body(body)),
-            ElementKind::GearTorque(_) => None,
+            ElementKind::GearTorque(_) | ElementKind::Phase(..) => None,
             ElementKind::Voltage(drive) => Some(What::Voltage(drive)),
             ElementKind::Current(drive) => Some(What::Current(drive)),
             ElementKind::Span(spring) => Some(What::Span(spring)),

@@ -110,6 +110,7 @@ fn equations(tables: &Tables) -> Value {
             ElementKind::GearTorque(_) => "gear-torque",
             ElementKind::Voltage(_) => "voltage-limit",
             ElementKind::Current(_) => "current-limit",
+            ElementKind::Phase(..) => "phase-limit",
             ElementKind::Span(_) => "span",
             ElementKind::Gap(_) => "gap",
             ElementKind::Line(_) => "line",

@@ -46,7 +46,7 @@ pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
     check(args, target)?;
     let case = match target {
-        TargetName::Fmu | TargetName::Json => common.open_for(path, Files::All)?,
+        TargetName::C | TargetName::Fmu | TargetName::Json => common.open_for(path, Files::All)?,
         _ => common.open_motors_for(path, Files::All)?,
     };
     let own = match common::is_standard_input(path) {

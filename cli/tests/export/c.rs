@@ -13,7 +13,7 @@ use taut::signal::profile::Reference;
 use tempfile::TempDir;
 
 /// Warnings that every compiler is asked for.
-const STRICT: [&str; 8] =
+pub const STRICT: [&str; 8] =
     ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wconversion", "-ffp-contract=off", "-O2"];
 
 /// A processor with single precision in hardware.

@@ -22,7 +22,7 @@ pub struct Ways {
 }
 
 /// Numbers from 0 to 1 that look random.
-fn random(seed: u64) -> impl FnMut() -> f64 {
+pub fn random(seed: u64) -> impl FnMut() -> f64 {
     let mut number = seed;
     move || {
         number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);

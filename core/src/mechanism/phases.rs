@@ -176,10 +176,19 @@ impl Phases {
         (current > 0.0 && suffices).then(|| (current, (speed * (self.teeth * current + emf)).atan2(rate * current)))
     }
 
+    /// The amplitude of the phases' commands: a current of a chopper, A, or else a voltage, V.
+    pub fn commanded(&self) -> f64 {
+        if self.regulator.is_some() { self.amplitude } else { self.supply }
+    }
+
+    /// The amplitude of the phase currents at rest, A; none exceeds V/R.
+    pub fn holding_current(&self) -> f64 {
+        if self.regulator.is_some() { self.amplitude } else { self.supply / self.resistance }
+    }
+
     /// Currents at rest at this commanded angle of the field, A.
     pub fn at_rest(&self, told: f64) -> [f64; 2] {
-        let most = self.supply / self.resistance;
-        let amplitude = if self.regulator.is_some() { self.amplitude } else { most };
+        let (most, amplitude) = (self.supply / self.resistance, self.holding_current());
         [0.0, FRAC_PI_2].map(|shift| (amplitude * (self.electrical(told) - shift).cos()).clamp(-most, most))
     }
 }

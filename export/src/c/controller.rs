@@ -34,7 +34,7 @@ impl Controller {
             ("controller".into(), self.design.structure.name().into()),
             ("sample time".into(), format!("{:?} s", self.design.every)),
             ("delay of its command".into(), format!("{:?} s", self.design.delay)),
-            ("numbers that it keeps".into(), self.program.states.len().to_string()),
+            ("states of the controller".into(), self.program.states.len().to_string()),
         ]
     }
 

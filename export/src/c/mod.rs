@@ -18,7 +18,7 @@ pub(super) fn named(case: &Case, part: Part, (stem, name): (&str, &str), options
     let (mut header, mut source) = (String::new(), String::new());
     let (mut facts, mut notes) = (Vec::new(), Vec::new());
     if part.has_plant() {
-        let tables = Tables::new(&super::mechanism(case)).map_err(|error| match super::controller(case) {
+        let tables = Tables::with_steppers(&super::mechanism(case)).map_err(|error| match super::controller(case) {
             Ok(_) => error.next("`taut export fmu` takes it as it is, and --part controller leaves the machine out"),
             Err(_) => error,
         })?;

@@ -1,11 +1,15 @@
 /* --- the plant ------------------------------------------------------------------------------------------------------ */
 /*
- * z = (states, inputs, 1). In a mode, what all elements do together, every state's rate is a row of weights on z, and
- * the mode holds while no guard, a row too, is below zero. A step is a chain of Taylor series of z; the first fall of a
+ * z = (states, products, inputs, 1). In a mode, what all elements do together, every state's rate is a row of weights on
+ * z, and the mode holds while no guard, a row too, is below zero. A product is that of two places of z before it. A step is a chain of Taylor series of z; the first fall of a
  * guard along a series is an event, located to the last bit, after which the rows of the next mode hold.
  */
 
 @tables@
+
+/* Places that move along a series, and the first of the inputs. */
+#define MOVING (STATES + PRODUCTS)
+#define FIRST_INPUT MOVING
 
 #define NONE 255U
 #define LEAVE 255U
@@ -43,7 +47,7 @@ static @local@struct {
     uint8_t is_fresh;
     uint8_t at_edge;
     @name@_status status;
-} plant;
+@told@} plant;
 
 /* The Taylor series under way, and the coefficients of a guard along it. */
 static @local@@name@_real term[ORDER + 1][SIZE];
@@ -171,7 +175,7 @@ static void expand(@name@_real distance)
     }
     for (k = 1U; k <= ORDER; k++) {
         const @name@_real factor = distance * RECIPROCAL[k];
-        const uint32_t places = (k == 1U) ? SIZE : STATES;
+        const uint32_t places = (k == 1U) ? SIZE : MOVING;
         for (i = 0U; i < STATES; i++) {
             const @name@_real *row = plant.rate[i];
             @name@_real sum = R(0.0);
@@ -180,9 +184,25 @@ static void expand(@name@_real distance)
             }
             term[k][i] = sum * factor;
         }
-        for (i = STATES; i < SIZE; i++) {
+        for (i = 0U; i < PRODUCTS; i++) {
+            @name@_real sum = R(0.0);
+            for (j = 0U; j <= k; j++) {
+                sum += term[j][PRODUCT[i].one] * term[k - j][PRODUCT[i].other];
+            }
+            term[k][STATES + i] = sum;
+        }
+        for (i = FIRST_INPUT; i < SIZE; i++) {
             term[k][i] = R(0.0);
         }
+    }
+}
+
+/* The products of z. */
+static void multiply(void)
+{
+    uint32_t i;
+    for (i = 0U; i < PRODUCTS; i++) {
+        plant.z[STATES + i] = plant.z[PRODUCT[i].one] * plant.z[PRODUCT[i].other];
     }
 }
 
@@ -203,6 +223,7 @@ static void add_series(@name@_real s)
         plant.carry[i] = (sum - plant.z[i]) - moved;
         plant.z[i] = sum;
     }
+    multiply();
 }
 
 /* The coefficients of a guard along the first part of the series. */
@@ -212,7 +233,7 @@ static void along(const @name@_real row[], @name@_real part)
     uint32_t j;
     uint32_t k;
     for (k = 0U; k <= ORDER; k++) {
-        const uint32_t places = (k == 0U) ? SIZE : STATES;
+        const uint32_t places = (k == 0U) ? SIZE : MOVING;
         @name@_real sum = R(0.0);
         for (j = 0U; j < places; j++) {
             sum += row[j] * term[k][j];
@@ -240,7 +261,14 @@ static void expand_sizes(@name@_real distance)
             }
             term_size[k][i] = sum * factor;
         }
-        for (i = STATES; i < SIZE; i++) {
+        for (i = 0U; i < PRODUCTS; i++) {
+            @name@_real sum = R(0.0);
+            for (j = 0U; j <= k; j++) {
+                sum += term_size[j][PRODUCT[i].one] * term_size[k - j][PRODUCT[i].other];
+            }
+            term_size[k][STATES + i] = sum;
+        }
+        for (i = FIRST_INPUT; i < SIZE; i++) {
             term_size[k][i] = R(0.0);
         }
     }
@@ -553,6 +581,7 @@ static void change(uint32_t k)
         plant.z[RESET[i].place] = RESET[i].value;
         plant.carry[RESET[i].place] = R(0.0);
     }
+    multiply();
     if ((GUARD[guard].decides != 0U) && (plant.changes <= TURNS_AT_ONCE)) {
         to = decide(guard);
     }
@@ -648,6 +677,7 @@ static void settle(void)
     }
 }
 
+@commands@
 /* A step begins: what it may do. */
 static void begin(void)
 {
@@ -682,6 +712,7 @@ void @name@_start(const @name@_real position[@NAME@_BODIES], const @name@_real s
         }
         plant.z[COORDINATE[body]] = (size_of(length) <= (R(4.0) * EPSILON * size)) ? R(0.0) : length;
     }
+@hold@    multiply();
     for (i = 0U; i < ELEMENTS; i++) {
         plant.does[i] = AT_REST[i];
         if (ELEMENT_SPEED[i] != NONE) {
@@ -708,30 +739,6 @@ void @name@_reset(void)
 {
     static const @name@_real none[@NAME@_BODIES] = {R(0.0)};
     @name@_start(none, none);
-}
-
-/* Takes up inputs; 0 where they are no numbers. */
-static int take_input(const @name@_real input[])
-{
-    uint32_t i;
-    int is_new = 0;
-    for (i = 0U; i < @NAME@_DRIVES; i++) {
-        if (!is_number(input[i])) {
-            return 0;
-        }
-        if ((input[i] < plant.z[STATES + i]) || (input[i] > plant.z[STATES + i])) {
-            is_new = 1;
-        }
-    }
-    if (is_new) {
-        for (i = 0U; i < @NAME@_DRIVES; i++) {
-            plant.z[STATES + i] = input[i];
-        }
-        refreshed();
-        plant.at_edge = 1U;
-        settle();
-    }
-    return 1;
 }
 
 /* Goes on by what is left, s, until there have been too many events in this step; says what is left then. */
@@ -769,15 +776,14 @@ static @name@_status go_on(@name@_real *left)
 @name@_status @name@_step(const @name@_real input[@NAME@_DRIVES])
 {
     @name@_real left = @NAME@_STEP;
+    @name@_status taken;
     if (plant.status == @NAME@_LEFT_TRAVEL) {
         return plant.status;
     }
     plant.status = @NAME@_DONE;
     begin();
-    if (!take_input(input)) {
-        return @NAME@_NO_NUMBER;
-    }
-    return go_on(&left);
+    taken = take_input(input);
+    return (taken == @NAME@_DONE) ? go_on(&left) : taken;
 }
 
 void @name@_read(@name@_output *out)
@@ -808,6 +814,6 @@ void @name@_read(@name@_output *out)
     for (i = 0U; i < @NAME@_SPRINGS; i++) {
         out->force[i] = value_of(row_of(FORCE_TABLE + i, plant.does));
     }
-}
+@read@}
 
 uint32_t @name@_events(void) { return plant.events; }

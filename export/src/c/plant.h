@@ -9,7 +9,7 @@ typedef struct {
     @name@_real speed[@NAME@_BODIES];    /* rad/s or m/s */
     @name@_real current[@NAME@_DRIVES];  /* A */
     @name@_real voltage[@NAME@_DRIVES];  /* V at the motor's terminals */
-    @name@_real force[@NAME@_SPRINGS];   /* N or N m; of a belt's span beyond its pretension */
+@outputs@    @name@_real force[@NAME@_SPRINGS];   /* N or N m; of a belt's span beyond its pretension */
     int8_t motion[@NAME@_BODIES];        /* -1 backward, 0 stuck, 1 forward, 2 free */
 } @name@_output;
 
@@ -18,8 +18,8 @@ typedef enum {
     @NAME@_DONE = 0,
     @NAME@_TOO_MANY_EVENTS = 1, /* more than @NAME@_EVENTS in one step: the rest of the step is left out */
     @NAME@_LEFT_TRAVEL = 2,     /* the cart left its travel; it stays where that was */
-    @NAME@_NO_NUMBER = 3        /* an input that is no finite number: nothing was done; or a state that became none */
-} @name@_status;
+    @NAME@_NO_NUMBER = 3@more@       /* an input that is no finite number: nothing was done; or a state that became none */
+@statuses@} @name@_status;
 
 /* Events that one step may have, and Taylor series. */
 #define @NAME@_EVENTS @events@U
@@ -30,10 +30,10 @@ typedef enum {
 /* Step, s. */
 #define @NAME@_STEP @step@
 
-/* At rest at the origin, no voltage or current commanded. Call this, or @name@_start, before anything else. */
+/* At rest at the origin, @idle@. Call this, or @name@_start, before anything else. */
 void @name@_reset(void);
 
-/* At these positions and speeds, currents zero. */
+/* At these positions and speeds, @currents@. */
 void @name@_start(const @name@_real position[@NAME@_BODIES], const @name@_real speed[@NAME@_BODIES]);
 
 /* One step with the commands of the drives held. */

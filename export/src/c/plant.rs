@@ -4,7 +4,8 @@ use super::{Writer, number, plain};
 use crate::Real;
 use crate::error::{Error, Result};
 use crate::packed::Packed;
-use crate::tables::{Element, ElementKind, Tables, Then};
+use crate::tables::{Element, ElementKind, Stepped, Tables, Then};
+use std::f64::consts::PI;
 use std::fmt::Write;
 
 /// Events that a step may have before it is given up.
@@ -30,8 +31,17 @@ const NONE: usize = 255;
 /// The type of its numbers, before the name is filled in.
 const REAL: &str = "@name@_real";
 
+/// Terms of sine and cosine in `stepper.c`.
+const CIRCULAR: usize = 9;
+
+/// Electrical turns that a command may be away from zero, and microsteps, which have to be whole numbers of 32 bits.
+const TURNS: f64 = 1e6;
+const MICROSTEPS: f64 = 2e9;
+
 const HEADER: &str = include_str!("plant.h");
 const SOURCE: &str = include_str!("plant.c");
+const MOTOR: &str = include_str!("motor.c");
+const STEPPER: &str = include_str!("stepper.c");
 
 /// A plant with its step.
 pub(super) struct Plant<'t> {
@@ -70,7 +80,8 @@ impl<'t> Plant<'t> {
             Real::Float => FLOAT,
             Real::Double => DOUBLE,
         };
-        let parts = (tables.fastest * step / 2.0).ceil().max(1.0);
+        let reach = tables.fastest * step + tables.turns();
+        let parts = (reach / 2.0).ceil().max(1.0);
         if parts > MOST_SERIES || !(step > 0.0 && step.is_finite()) {
             // Rounded to six digits, and still short enough.
             let fits = crate::quantity::rounded((1.0 - 1e-5) * Self::longest_step(tables));
@@ -79,14 +90,14 @@ impl<'t> Plant<'t> {
                 .allowed(format!("steps of up to {fits} s"))
                 .next("name a shorter --step"));
         }
-        let reach = tables.fastest * step / parts;
+        let reach = reach / parts;
         let order = orders.iter().find(|(most, _)| reach <= *most).map_or(orders[3].1, |(_, order)| *order);
         Ok(Self { tables, step, real, parts: parts as usize, order })
     }
 
     /// The longest step that it can have, s.
     pub(super) fn longest_step(tables: &Tables) -> f64 {
-        MOST_SERIES * 2.0 / tables.fastest
+        (MOST_SERIES * 2.0 - tables.turns()) / tables.fastest
     }
 
     fn number(&self, value: f64) -> String {
@@ -120,6 +131,9 @@ impl<'t> Plant<'t> {
     /// `plant.c`.
     fn work(&self) -> Work {
         let (n, z, o, g) = (self.tables.rates.len(), self.tables.size(), self.order, self.active());
+        // Places that move, and products, whose terms are sums of two to o + 1 products.
+        let (p, steppers) = (self.tables.products.len(), self.tables.steppers.len());
+        let (m, cauchy) = (n + p, Work(p * o * (o + 3) / 2, p * o * (o + 3) / 2));
         let gears = self.tables.resting_torque.iter().flatten().count();
         let events = EVENTS;
         let (series, terms) = (self.series(), o + 1);
@@ -127,14 +141,14 @@ impl<'t> Plant<'t> {
         let value = Work(z, z);
         let noise = Work(z + 1, z);
         let look = (value + noise + Work(1, 1)) * g;
-        let expand = Work(o + n * (z + 1) + (o - 1) * n * (n + 1), n * z + (o - 1) * n * n);
-        let sizes = Work(o * (1 + n * (z + 1)), o * n * z);
-        let along = Work(z + o * n + 2 * terms, z + o * n);
+        let expand = Work(o + n * (z + 1) + (o - 1) * n * (m + 1), n * z + (o - 1) * n * m) + cauchy;
+        let sizes = Work(o * (1 + n * (z + 1)), o * n * z) + cauchy;
+        let along = Work(z + o * m + 2 * terms, z + o * m);
         let first_term = Work(terms * (z + 2), terms * z);
         let hull = Work(4 * terms, 2 * terms + terms * terms);
         let fall = along + hull;
         let root = Work(1, 1) + Work(2 * terms + 3, 2 * terms + 3) * (NEWTON + self.bits());
-        let add = Work(n * o, n * (o + 4));
+        let add = Work(n * o + p, n * (o + 4));
         // Of each series: twice along each guard, and once more where it begins at zero.
         let advance = look + expand + sizes + (fall * 2 + along + first_term + Work(1, 0)) * g + add + Work(5, 4);
         // A series in which a guard falls ends with an event, or with the one that is too many.
@@ -143,12 +157,14 @@ impl<'t> Plant<'t> {
         let resting = value * gears;
         let of_body = (resting + value + noise) * 3 + Work(3, 3);
         let of_element = (value + noise + Work(2, 1)) * g;
-        let change = value + noise + Work(1, 0) + of_body + of_element;
+        let change = value + noise + Work(1 + p, 0) + of_body + of_element;
         let fallen = look + expand + sizes + (along + first_term) * g;
         // Settled at the input and after each event: a turn for each event, one at the edge, and the last of each time.
         let settle =
             fallen * (2 * events + 3) + (noise + Work(1, 0)) * g + (value + noise + Work(1, 0)) * (g * (events + 1));
-        advance * series + roots + halvings + change * (events + 1) + settle + Work(0, n + z)
+        // Sine and cosine of each field, those of each rotor brought back to the circle, and its command.
+        let commands = (Work(7, 6) * CIRCULAR + Work(16, 12)) * steppers + Work(p, 0);
+        advance * series + roots + halvings + change * (events + 1) + settle + commands + Work(0, n + z)
     }
 
     pub(super) fn facts(&self) -> Vec<(String, String)> {
@@ -186,9 +202,25 @@ impl<'t> Plant<'t> {
         list("SPRINGS", mechanism.springs.iter().map(|spring| spring.label.key).collect());
         let numbers = numbers.replace("_BOD_", "_BODY_");
         let Work(products, sums) = self.work();
+        let [outputs, more, statuses, idle, currents] = match self.tables.steppers.is_empty() {
+            true => ["", " ", "", "no voltage or current commanded", "currents zero"],
+            false => [
+                "    @name@_real second_current[@NAME@_DRIVES]; /* A in the second phase; `current` is that in the first */\n    \
+                 @name@_real second_voltage[@NAME@_DRIVES]; /* V at the second phase; `voltage` is that at the first */\n    \
+                 int32_t lost_steps[@NAME@_DRIVES];         /* full steps by which the rotor is behind its field */\n",
+                ",",
+                "    @NAME@_TOO_FAR = 4          /* a command more than two full steps from the last one: nothing was done */\n",
+                "the positions zero commanded",
+                "currents those that hold the rotors there",
+            ],
+        };
+        let header = HEADER.replace("@outputs@", outputs).replace("@statuses@", statuses);
         writer.fill(
-            HEADER,
+            &header,
             &[
+                ("@more@", more),
+                ("@idle@", idle),
+                ("@currents@", currents),
                 ("@title@", &plain(title)),
                 ("@numbers@", numbers.trim_end()),
                 ("@events@", &EVENTS.to_string()),
@@ -201,8 +233,33 @@ impl<'t> Plant<'t> {
     }
 
     pub(super) fn source(&self, writer: &Writer) -> String {
-        let limits = [("@halvings@", &*HALVINGS_OF_STEP.to_string()), ("@newton@", &*NEWTON.to_string())];
-        writer.fill(&SOURCE.replace("@tables@", self.tables().trim_end()), &limits)
+        let microsteps = self.tables.steppers.iter().filter_map(|own| own.microstep.map(|way| 1.0 / way));
+        let farthest = self.tables.steppers.iter().zip(microsteps).map(|(own, per_metre)| {
+            // Microsteps in an electrical turn.
+            MICROSTEPS / (per_metre * 2.0 * own.farthest)
+        });
+        let turns = self.number(farthest.fold(TURNS, f64::min));
+        let limits = [
+            ("@halvings@", &*HALVINGS_OF_STEP.to_string()),
+            ("@newton@", &*NEWTON.to_string()),
+            ("@circular@", &*CIRCULAR.to_string()),
+            ("@turns@", &*turns),
+        ];
+        let [commands, told, hold, read] = match self.tables.steppers.is_empty() {
+            true => [MOTOR, "", "", ""],
+            false => [
+                STEPPER,
+                "    @name@_real told[@NAME@_DRIVES]; /* positions that the fields are told, m */\n",
+                "    hold_rotors(position);\n",
+                "    for (i = 0U; i < @NAME@_DRIVES; i++) {\n        const @name@_real lag = plant.told[i] - \
+                 (out->position[SHAFT[i]] * WAY[i]);\n        out->second_current[i] = value_of(row_of(OTHER_TABLE + i, \
+                 plant.does));\n        out->second_voltage[i] = value_of(row_of(OTHER_TABLE + @NAME@_DRIVES + i, \
+                 plant.does));\n        out->lost_steps[i] = 4 * nearest(lag * TURNS[i]);\n    }\n",
+            ],
+        };
+        let source = SOURCE.replace("@tables@", self.tables().trim_end()).replace("@commands@", commands.trim_end());
+        let source = source.replace("@told@", told).replace("@hold@", hold).replace("@read@", read);
+        writer.fill(&source, &limits)
     }
 
     /// All tables.
@@ -246,6 +303,7 @@ impl<'t> Plant<'t> {
             ("GUARDS", tables.guards.len()),
             ("SLOTS", tables.slots),
             ("RESTINGS", packed.resting.len()),
+            ("PRODUCTS", tables.products.len()),
             ("REPLACED", layout.replaced.len()),
         ] {
             let _ = writeln!(text, "static const uint32_t {word} = {count}U;");
@@ -269,6 +327,37 @@ impl<'t> Plant<'t> {
         text += &self.elements(&packed, &whole);
         text += &self.guards(&packed);
         text += &self.places(&whole);
+        text += "\n/* Products of two places of z. */\nstatic const struct {\n    uint8_t one;\n    uint8_t other;\n} PRODUCT[] = ";
+        let products = tables.products.iter().map(|[one, other]| format!("{{{one}U, {other}U}}"));
+        text += &records(&products.collect::<Vec<_>>(), "{0U, 0U}");
+        if !tables.steppers.is_empty() {
+            text += &self.steppers(&whole);
+        }
+        text
+    }
+
+    /// What is known of each stepper.
+    fn steppers(&self, whole: &dyn Fn(&[usize]) -> Vec<String>) -> String {
+        let steppers = &self.tables.steppers;
+        let mut text = String::from(
+            "\n/* Steppers: the body of the rotor and the place of its sine; electrical turns per m, m per rad, a microstep and \
+             the farthest jump, m; what a phase is commanded, at most; what it carries at rest, and what the supply allows. */\n",
+        );
+        text += &list("uint8_t", "SHAFT", whole(&steppers.iter().map(|own| own.shaft).collect::<Vec<_>>()));
+        text += &list("uint8_t", "SINE", whole(&steppers.iter().map(|own| own.sine).collect::<Vec<_>>()));
+        let columns: [(&str, &dyn Fn(&Stepped) -> f64); 7] = [
+            ("TURNS", &|own| own.phases.teeth * own.per_input / (2.0 * PI)),
+            ("WAY", &|own| 1.0 / own.per_input),
+            ("MICROSTEP", &|own| own.microstep.unwrap_or(0.0)),
+            // With what rounding may add.
+            ("FARTHEST", &|own| own.farthest * (1.0 + 1e-6)),
+            ("FIELD", &|own| own.phases.commanded()),
+            ("HOLDING", &|own| own.phases.holding_current()),
+            ("MOST", &|own| own.phases.supply / own.phases.resistance),
+        ];
+        for (name, of) in columns {
+            text += &list(REAL, name, steppers.iter().map(|own| self.number(of(own))));
+        }
         text
     }
 

@@ -36,7 +36,7 @@ pub(super) fn export(case: &Case, part: Option<Part>, stem: &str) -> Result<Expo
         (if drives.len() == 1 { "function block" } else { "function blocks" }.into(), names.join(", ")),
         ("controller".into(), design.structure.name().into()),
         ("sample time".into(), format!("{:?} s", design.every)),
-        ("numbers that it keeps".into(), states.to_string()),
+        ("states of the controller".into(), states.to_string()),
     ];
     let mut notes =
         vec!["untried on a real controller: its grammar is checked, and it is run by an interpreter".into()];

@@ -1,0 +1,209 @@
+//! Machines with steppers in C, drawn at random, against taut's own solver along the same held commands.
+
+use super::c::STRICT;
+use super::machines::random;
+use super::tools::{are_there, doubles, file, run, taut, try_to, write_doubles};
+use std::fmt::Write;
+use std::fs;
+use taut::case::Case;
+use taut::mechanism::{Status, What};
+use taut::solve::{Ending, Solution, Solver, simulate};
+use tempfile::TempDir;
+
+/// Steps of a command, of 1 ms each.
+const STEPS: usize = 120;
+
+/// A machine in a case whose commands are held, and the commands of its drives.
+struct Drawn {
+    case: String,
+    commands: Vec<Vec<f64>>,
+}
+
+/// Smooth ways there and back, so slow that no command jumps by more than two full steps, but for `hasty` ones, too fast
+/// for the motor.
+fn drawn(seed: u64) -> Drawn {
+    let mut uniform = random(seed);
+    let mut between = |low: f64, high: f64| low + (high - low) * uniform();
+    let is_plane = between(0.0, 1.0) < 0.4;
+    let (holding, rated) = (between(0.2, 1.0), between(0.8, 3.0));
+    let resistance = between(0.8, 2.5) / rated;
+    let chopper = between(0.0, 1.0) < 0.7;
+    let supply = if chopper { between(12.0, 36.0) } else { 2.0_f64.sqrt() * rated * resistance * 0.999 };
+    let drive = if chopper { "chopper" } else { "voltage" };
+    let (radius, microsteps) = (between(5e-3, 1e-2), [1, 4, 16][(3.0 * between(0.0, 0.999)) as usize]);
+    let kind = if is_plane { "kind = \"core-xy\"\n" } else { "" };
+    let mut case = format!(
+        "{kind}[stepper]\nsteps_per_turn = 200\nholding_torque = {holding:e}\nrated_current = {rated:e}\nresistance = {resistance:e}\n\
+         inductance = {:e}\nsupply = {supply:e}\ndrive = \"{drive}\"\nmicrosteps = {microsteps}\ninterpolate = {}\n\
+         detent_torque = {:e}\nrotor_inertia = {:e}\n",
+        resistance * between(1e-3, 3e-3),
+        between(0.0, 1.0) < 0.3,
+        holding * between(0.0, 0.05),
+        1.2e-5 * holding,
+    );
+    let (viscous, coulomb) = (between(0.5, 5.0), holding / radius * between(0.0, 0.1));
+    let stiffness = 10f64.powf(between(4.0, 5.3));
+    let slide = |mass: f64| format!("mass = {mass:e}\nfriction = {{ viscous = {viscous:e}, coulomb = {coulomb:e} }}\n");
+    let pulley = format!("radius = {radius:e}\ninertia = 1e-6\n");
+    let drives = if is_plane { 2 } else { 1 };
+    match is_plane {
+        true => {
+            let _ = write!(
+                case,
+                "[drive_pulley]\n{pulley}[cart]\n{}[bridge]\n{}[belt]\nstiffness = {:?}\ndamping = [2.0, 3.0, 4.0, 5.0]\n",
+                slide(between(0.1, 0.4)),
+                slide(between(0.3, 0.8)),
+                [1.0, 0.7, 0.9, 0.6].map(|share| share * stiffness),
+            );
+        }
+        false => {
+            let _ = write!(
+                case,
+                "[drive_pulley]\n{pulley}friction = {{ coulomb = {:e} }}\n[cart]\n{}[idler_pulley]\ninertia = 5e-7\n[belt]\n\
+                 stiffness = [{stiffness:e}, {stiffness:e}, {:e}]\ndamping = [{:e}, {:e}, {:e}]\n",
+                holding * between(0.0, 0.05),
+                slide(between(0.1, 0.5)),
+                0.5 * stiffness,
+                1e-4 * stiffness,
+                1e-4 * stiffness,
+                5e-5 * stiffness,
+            );
+        }
+    }
+    // Two full steps of 1.8 degrees each are the most of a command.
+    let most = 2.0 * radius * 1.8_f64.to_radians() * between(0.1, 0.9);
+    let shares: Vec<f64> = (0..drives).map(|_| between(-1.0, 1.0)).collect();
+    let mut at = vec![0.0; drives];
+    let mut commands = Vec::new();
+    for k in 0..STEPS {
+        let way = (std::f64::consts::PI * k as f64 / 30.0).sin();
+        at.iter_mut().zip(&shares).for_each(|(at, share)| *at += if k < 90 { share * most * way } else { 0.0 });
+        commands.push(at.clone());
+    }
+    let held = |drive: usize| -> String {
+        let each = commands.iter().map(|command| format!("{{ step = {:?}, lasts = \"1 ms\" }}", command[drive]));
+        format!("{{ sequence = [{}, {{ step = {:?} }}] }}", each.collect::<Vec<_>>().join(", "), at[drive])
+    };
+    let input = match drives {
+        1 => held(0),
+        _ => format!("{{ left = {}, right = {} }}", held(0), held(1)),
+    };
+    let _ =
+        write!(case, "[[experiment]]\nname = \"held\"\nuntil = \"{STEPS} ms\"\nevery = \"1 ms\"\ninput = {input}\n");
+    Drawn { case, commands }
+}
+
+fn exported(drawn: &Drawn, options: &[&str]) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("case.toml"), &drawn.case).unwrap();
+    let words = [&["export", "c", "case.toml", "--out", "model.c"], options].concat();
+    let output = taut(folder.path(), &words);
+    assert!(output.status.success(), "{}\n{}", String::from_utf8_lossy(&output.stderr), drawn.case);
+    fs::copy(file("cli/tests/export/stepper.c"), folder.path().join("stepper.c")).unwrap();
+    folder
+}
+
+/// Runs it: what it writes, and the lost steps.
+fn in_c(drawn: &Drawn, options: &[&str]) -> (Vec<f64>, Vec<i32>) {
+    let folder = exported(drawn, options);
+    write_doubles(&folder.path().join("in.bin"), drawn.commands.iter().flatten().copied());
+    let compile = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "stepper.c", "model.c", "-o", "here"];
+    run(folder.path(), "gcc", &[&STRICT[..], &compile].concat());
+    let told = run(folder.path(), folder.path().join("here"), &[]);
+    let lost = told.split_whitespace().map(|word| word.parse().unwrap()).collect();
+    (doubles(&folder.path().join("out.bin")), lost)
+}
+
+fn solved(drawn: &Drawn) -> (Case, Solution) {
+    let case = Case::from_text("case.toml", &drawn.case).unwrap_or_else(|error| panic!("{error}\n{}", drawn.case));
+    let solution = simulate(&case.machine, &case.experiments[0], Solver::General { tolerance: 1e-11 }).unwrap();
+    assert_eq!(solution.outcome.ending, Ending::Complete);
+    (case, solution)
+}
+
+/// Each position within 1e-9 m at the belt of taut's, each current within a millionth of the rated one, and the same
+/// steps lost; in single precision within 20 µm, unless steps are lost.
+#[test]
+fn drawn_machines_go_where_taut_has_them() {
+    if !are_there(&["gcc"]) {
+        return;
+    }
+    let (mut lost_any, mut kept_all) = (0, 0);
+    for seed in 0..16 {
+        let drawn = drawn(500 + seed);
+        let (case, solution) = solved(&drawn);
+        let mechanism = case.machine.mechanism();
+        let (bodies, drives) = (mechanism.bodies.len(), mechanism.drives.len());
+        let (written, lost) = in_c(&drawn, &[]);
+        let row = bodies + 2 * drives;
+        assert_eq!(written.len(), row * STEPS, "{seed}");
+        let columns = &solution.trajectory.columns;
+        let positions: Vec<_> =
+            columns.iter().filter(|c| c.name.ends_with("_angle") || c.name.ends_with("_position")).collect();
+        assert_eq!(positions.len(), bodies, "{:?}", columns.iter().map(|c| &c.name).collect::<Vec<_>>());
+        let of = |ending: &'static str| columns.iter().filter(move |column| column.name.ends_with(ending));
+        let currents: Vec<_> = of("motor_current").zip(of("second_phase_current")).collect();
+        assert_eq!(currents.len(), drives);
+        let (mut off, mut off_current): (f64, f64) = (0.0, 0.0);
+        for k in 1..STEPS {
+            let own = &written[row * (k - 1)..row * k];
+            for (body, column) in positions.iter().enumerate() {
+                off = off.max((own[body] - column.values[k]).abs() * mechanism.bodies[body].kind.lever());
+            }
+            for (drive, (first, second)) in currents.iter().enumerate() {
+                let both = &own[bodies + 2 * drive..];
+                off_current =
+                    off_current.max((both[0] - first.values[k]).abs().max((both[1] - second.values[k]).abs()));
+            }
+        }
+        let mut behind = vec![0; drives];
+        for event in &solution.outcome.events {
+            if let (What::Field(drive), Status::Slipped(pitches)) = (event.part.what, event.to) {
+                behind[drive] = 4 * pitches;
+            }
+        }
+        println!("{seed}: {off:.1e} m, {off_current:.1e} A, {lost:?}");
+        let rated = mechanism.drives[0].motor.stepper.unwrap().rated_current;
+        let is_kept = behind.iter().all(|steps| *steps == 0);
+        // A rotor that falls to another tooth amplifies what is off before.
+        let most = if is_kept { 1e-9 } else { 1e-7 };
+        assert!(off < most && off_current < 1e3 * most * rated, "{seed}: {off:e} m, {off_current:e} A\n{}", drawn.case);
+        assert_eq!(lost, behind, "{seed}\n{}", drawn.case);
+        if is_kept {
+            kept_all += 1;
+            let (single, lost) = in_c(&drawn, &["--real", "float"]);
+            let each = single
+                .chunks(row)
+                .zip(written.chunks(row))
+                .flat_map(|(a, b)| (0..bodies).map(move |body| (a[body] - b[body]).abs()));
+            let levers = mechanism.bodies.iter().map(|body| body.kind.lever()).fold(0.0, f64::max);
+            let off = each.fold(0.0, f64::max) * levers.min(1.0);
+            assert!(lost == behind && off < 2e-5, "{seed}: {off:e} m in single precision");
+        } else {
+            lost_any += 1;
+        }
+    }
+    assert!(lost_any > 0 && kept_all > 4, "{lost_any} lost steps, {kept_all} did not");
+}
+
+/// Jumps beyond two full steps and numbers that are none change nothing and have a status; so has the export of a
+/// controller, which a stepper does not have.
+#[test]
+fn what_a_stepper_cannot_follow_is_a_status() {
+    if !are_there(&["gcc"]) {
+        return;
+    }
+    let drawn = drawn(500);
+    let folder = exported(&drawn, &[]);
+    run(folder.path(), "gcc", &["-O2", "stepper.c", "model.c", "-o", "here"]);
+    for (command, status) in [(f64::NAN, 3), (1e9, 3), (5e-3, 4), (0.0, 0)] {
+        write_doubles(&folder.path().join("in.bin"), vec![command; drawn.commands[0].len()]);
+        assert_eq!(try_to(folder.path(), &folder.path().join("here"), &[]).status.code(), Some(status), "{command}");
+    }
+    for (target, part, word) in [("c", "controller", "without a controller"), ("st", "controller", "stepper")] {
+        let output = taut(folder.path(), &["export", target, "case.toml", "--part", part, "--out", "other.c"]);
+        assert!(!output.status.success());
+        let told = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(told.contains(word) && told.contains("next:"), "{told}");
+    }
+}
