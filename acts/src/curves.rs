@@ -157,7 +157,7 @@ fn of_gantry(gantry: &Machine) -> Vec<Panel> {
         panel("speed", "Speed", "Speed of bridge and cart", MM_S)
             .column("bridge_speed", "bridge x′")
             .column("cart_speed", "cart y′"),
-        panel("error", "Place minus drives", "How far bridge and cart are from where the drives say", UM)
+        panel("error", "Position error of the drives", "How far bridge and cart are from where the drives say", UM)
             .curve("x_error", "bridge", &error(0, "bridge_position"))
             .curve("y_error", "cart", &error(1, "cart_position")),
         yaw.column("yaw_angle", "yaw ψ"),

@@ -101,7 +101,7 @@ fn worse_gains_are_called_worse_and_written_in_place_only_if_told() {
     let output = taut(folder.path()).args(soft).output().unwrap();
     let (shown, told) = (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
     assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(shown.starts_with("WORSE than the gains of the file: short fast errs "), "{shown}");
+    assert!(shown.starts_with("WORSE than the gains of the file: short fast: worst-case error "), "{shown}");
     assert!(told.contains("error: the case file was not changed"), "{told}");
     assert_eq!(fs::read_to_string(&path).unwrap(), before);
     assert_eq!(taut(folder.path()).args(soft).arg("--anyway").output().unwrap().status.code(), Some(1));

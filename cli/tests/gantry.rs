@@ -183,7 +183,7 @@ fn modes_tells_rigid_and_elastic_ones_and_maps_the_area() {
         "bridge      per m: left pulley 51.55 rad, right pulley 51.55 rad, cart 0",
         "cart        per m: left pulley 51.55 rad, right pulley -51.55 rad, bridge 0",
         "191.97 Hz   damping ",
-        "ways at the belt: left pulley 1.000, right pulley 1.000, bridge -0.279, cart 0.000",
+        "mode shape at the belt: left pulley 1.000, right pulley 1.000, bridge -0.279, cart 0.000",
         "energy: ",
         "elastic mode 2, Hz: from 220.1 to 354.9",
         "map.csv  modes.json  plots/  report.html  files.json",

@@ -54,7 +54,7 @@ pub(super) fn limits(machine: &Machine) -> Option<Group> {
         group
             .add("largest_acceleration", "largest acceleration over the travel", most, "m/s^2")
             .how("half of it up, half down, against friction, as one mass");
-        group.add("largest_acceleration_speed", "speed that it reaches", (most * way).sqrt(), "m/s");
+        group.add("largest_acceleration_speed", "peak speed", (most * way).sqrt(), "m/s");
     }
     Some(group)
 }

@@ -250,9 +250,9 @@ pub struct Shape {
 
 /// Vibration analysis: poles, zeros, frequency response, resonances.
 ///
-/// Linearises the machine of a case while everything slides, and prints poles with frequency and damping, rigid and
-/// elastic modes, gain and zeros from each drive to each output, and the resonances along the travel of an axis or over
-/// the working area of a gantry; with --sample-time also the discrete-time model. With --out it also writes modes.json
+/// Linearises the machine of a case while everything slides, and prints the resonances along the travel of an axis or
+/// over the working area of a gantry, rigid and elastic modes, and poles with frequency and damping; with --sample-time
+/// also the discrete-time model. --verbose adds gain and zeros from each drive to each output. With --out it also writes modes.json
 /// with the matrices, frequency-response.csv, map.csv (a gantry whose spans follow bridge and cart), and a report with
 /// Bode diagrams, maps, and poles and zeros.
 #[derive(Debug, clap::Args)]
@@ -260,6 +260,9 @@ pub struct Shape {
 pub struct Modes {
     /// The case file; - is standard input
     pub case: PathBuf,
+    /// Print gain and zeros of each output, too
+    #[arg(long, conflicts_with = "quiet")]
+    pub verbose: bool,
     /// Position of the cart, for spans that follow it and friction along the travel [default: 0 m]
     #[arg(long, value_name = "POSITION", value_parser = metres, allow_hyphen_values = true)]
     pub at: Option<f64>,

@@ -105,7 +105,8 @@ Examples:
 
 /// Run a case many times with its parameters varied.
 ///
-/// Prints the distribution of each key figure and the parameters that it depends on. With --out FILE it writes a row
+/// Prints the distribution of the main figures and the parameters that each depends on, with --verbose of all that vary.
+/// With --out FILE it writes a row
 /// for each run, as Parquet (units in its metadata) or CSV; with --out DIR also a summary, a report and plots. The same
 /// command resumes an interrupted or killed one. Rows are the same, bit for bit, on any number of threads.
 #[derive(Debug, clap::Args)]
@@ -115,6 +116,9 @@ Examples:
 pub struct Sweep {
     /// The case file; - is standard input
     pub case: PathBuf,
+    /// Print all figures that vary instead of the first five of each experiment
+    #[arg(long, conflicts_with = "quiet")]
+    pub verbose: bool,
     /// Number of machines to run
     #[arg(long, value_name = "N")]
     pub runs: Option<String>,

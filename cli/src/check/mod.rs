@@ -51,8 +51,22 @@ fn watched(case: &Case, plan: &Plan, quiet: bool) -> Result<Check, Failure> {
     }
 }
 
+/// What the logs determine, in a line.
+fn verdict(found: &Check) -> String {
+    match &found.identifiability {
+        _ if !found.tells() => "these logs determine none of the free parameters".into(),
+        Some(known) if known.complete() => "all free parameters are determined".into(),
+        Some(known) => {
+            let members = known.groups.iter().flat_map(|group| &group.members);
+            let names: Vec<&str> = members.map(|&member| known.names[member].as_str()).collect();
+            format!("not determined by themselves: {}", names.join(", "))
+        }
+        None => "all free parameters ended at a bound: their sensitivity is unknown".into(),
+    }
+}
+
 fn text(case: &Case, found: &Check) -> String {
-    let mut text = format!("{}\n", bold(&case.title));
+    let mut text = format!("{}\n{}\n", bold(&case.title), verdict(found));
     let _ = write!(text, "\n{}\n", bold("Logs"));
     text.push_str(&surveys(found));
     if let Some(found) = &found.balance {
@@ -81,14 +95,6 @@ fn text(case: &Case, found: &Check) -> String {
         let _ = writeln!(text, "  singular values {}", singular.join(", "));
     }
     let _ = writeln!(text, "  {}", found.noise_words);
-    text.push_str(match &found.identifiability {
-        Some(known) if known.complete() => "\nall free parameters are determined\n",
-        Some(_) => "",
-        None => "\nall free parameters ended at a bound: their sensitivity is unknown\n",
-    });
-    if !found.tells() {
-        text.push_str("\nthese logs determine none of the free parameters\n");
-    }
     for (group, choices) in found.groups() {
         let _ = write!(text, "\n{}\n  {}\n", bold("Not determined"), group.words);
         for combination in &group.combinations {

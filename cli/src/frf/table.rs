@@ -8,15 +8,6 @@ use taut_report::frf::{lines, quality};
 /// The text on the terminal.
 pub fn text(title: &str, found: &Measurement) -> String {
     let mut text = format!("{}\n", bold(title));
-    for one in &found.responses {
-        let _ = write!(text, "\n{}\n", bold(&one.frf.title()));
-        for line in lines(&one.frf) {
-            let _ = writeln!(text, "  {line}");
-        }
-        if let Some(margins) = &one.margins {
-            let _ = writeln!(text, "  with the case's controller: {}", margins.words());
-        }
-    }
     let _ = write!(text, "\n{}\n", bold("Fitted to the responses"));
     match &found.fit {
         Ok(fit) => {
@@ -27,6 +18,15 @@ pub fn text(title: &str, found: &Measurement) -> String {
         }
         Err(error) => {
             let _ = writeln!(text, "  none: {}", error.what);
+        }
+    }
+    for one in &found.responses {
+        let _ = write!(text, "\n{}\n", bold(&one.frf.title()));
+        for line in lines(&one.frf) {
+            let _ = writeln!(text, "  {line}");
+        }
+        if let Some(margins) = &one.margins {
+            let _ = writeln!(text, "  with the case's controller: {}", margins.words());
         }
     }
     text

@@ -23,7 +23,7 @@ pub fn run(args: &Args) -> Outcome {
     let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), names)?;
     let advice = "add --out DIR for matrices, frequency response and a report";
     let json = ("modes.json", json::text(&json::modes(&analysis)));
-    let mut finished = Finished::new("modes", json, table::text(&analysis), advice);
+    let mut finished = Finished::new("modes", json, table::text(&analysis, args.verbose), advice);
     if common.out.is_some() {
         finished.files.push(("frequency-response.csv".into(), responses(&analysis)));
         finished.files.extend(analysis.map.as_ref().map(|map| ("map.csv".to_string(), places(map))));

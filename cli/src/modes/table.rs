@@ -14,7 +14,7 @@ const ROWS: usize = 7;
 const PLACES: usize = 5;
 
 /// The text on the terminal.
-pub fn text(analysis: &Analysis) -> String {
+pub fn text(analysis: &Analysis, is_verbose: bool) -> String {
     let system = &analysis.system;
     let mut text = format!("{}\n", bold(&analysis.case.title));
     let _ = writeln!(text, "{}", machine(&analysis.case.machine));
@@ -24,15 +24,6 @@ pub fn text(analysis: &Analysis) -> String {
     for note in &analysis.words {
         let _ = writeln!(text, "  {note}");
     }
-    let _ = write!(text, "\n{}\n", bold("Poles"));
-    for root in Root::of(&analysis.poles) {
-        let (value, more) = pole(root);
-        let _ = writeln!(text, "  {value:<36}{more}");
-    }
-    if let Some(modes) = &analysis.modes {
-        shapes(&mut text, analysis, modes);
-    }
-    analysis.inputs.iter().for_each(|one| outputs(&mut text, one, analysis.inputs.len() > 1));
     let plane = analysis.case.machine.bridge.is_some();
     let heading = if plane { "Over the working area" } else { "Resonance and anti-resonance of the drive angle" };
     let _ = write!(text, "\n{}\n", bold(heading));
@@ -40,6 +31,18 @@ pub fn text(analysis: &Analysis) -> String {
     match &analysis.map {
         Some(map) => area(&mut text, map),
         None => travel(&mut text, analysis),
+    }
+    if let Some(modes) = &analysis.modes {
+        shapes(&mut text, analysis, modes);
+    }
+    let _ = write!(text, "\n{}\n", bold("Poles"));
+    for root in Root::of(&analysis.poles) {
+        let (value, more) = pole(root);
+        let _ = writeln!(text, "  {value:<36}{more}");
+    }
+    match is_verbose {
+        true => analysis.inputs.iter().for_each(|one| outputs(&mut text, one, analysis.inputs.len() > 1)),
+        false => text.push_str("\ngain and zeros of each output: --verbose\n"),
     }
     // The inputs have the same poles.
     if let Some(model) = analysis.inputs.first().and_then(|one| one.discrete.as_ref()) {

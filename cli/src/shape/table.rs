@@ -13,15 +13,15 @@ pub fn text(found: &Findings) -> String {
         if let Some(told) = one.damping_told() {
             let _ = writeln!(text, "{told}");
         }
-        text.push('\n');
-        shapers(&mut text, one);
-        modes(&mut text, one);
         let best = one.choice.best();
         let recommended = format!("recommended: {} at {:.1} Hz", best.shaper.form.name(), best.shaper.frequency);
         let _ = write!(text, "\n{}\n{}\n\n", bold(&recommended), one.choice.reason);
         for line in one.lines() {
             let _ = writeln!(text, "  {line}");
         }
+        text.push('\n');
+        shapers(&mut text, one);
+        modes(&mut text, one);
         text.push('\n');
         pairs(&mut text, one);
     }

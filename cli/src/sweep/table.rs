@@ -8,6 +8,9 @@ use std::time::Duration;
 use taut::sweep::{Measured, Summary};
 use taut_report::sweep::{endings, influence, influence_heading, number, plan};
 
+/// Figures of an experiment that are printed without `--verbose`.
+const MAIN: usize = 5;
+
 /// Text on the terminal.
 pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64) -> String {
     let mut text = format!("{}\n{}\n", bold(work.case.title.as_str()), plan(work.sweep));
@@ -21,7 +24,9 @@ pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64) -> String 
         // Counts of events are for the report.
         let shown = |measured: &&Measured| measured.varies() && !measured.unit.is_empty();
         let left_out = group.measures.len() - group.measures.iter().filter(shown).count();
-        for measured in group.measures.iter().filter(shown) {
+        let most = if work.args.verbose { usize::MAX } else { MAIN };
+        let more = group.measures.iter().filter(shown).count().saturating_sub(most);
+        for measured in group.measures.iter().filter(shown).take(most) {
             let Some(spread) = &measured.spread else { continue };
             let [_, low, middle, high, _] = spread.quantiles.map(|value| number(value, measured.unit));
             rows.push([measured.words.to_string(), low, middle, high, influence(summary, measured, 3)]);
@@ -38,7 +43,9 @@ pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64) -> String 
                 false => writeln!(text, "{}", format!("{line}  {most}").trim_end()),
             };
         }
-        if left_out > 0 {
+        if more > 0 {
+            let _ = writeln!(text, "  and {more} more figures: --verbose");
+        } else if left_out > 0 {
             let _ = writeln!(text, "  and {left_out} figures that count events, or are the same in all runs: --json");
         }
     }

@@ -475,7 +475,7 @@ impl Found {
                     (low, high) = (low.min(mode.frequency), high.max(mode.frequency));
                 }
                 let range = match high - low {
-                    d if d < 0.05 => format!("{high:.1} Hz wherever the cart is"),
+                    d if d < 0.05 => format!("{high:.1} Hz at every cart position"),
                     _ => format!("{low:.1} to {high:.1} Hz along the travel"),
                 };
                 let damping = damping(modes);

@@ -334,7 +334,7 @@ impl FrfFit {
             row("stiffness, of that in the file", "", self.stiffness),
             row("belt damping over stiffness", "s", self.damping),
             row("delay", "s", self.delay),
-            row("gain, of the model's", "", self.gain),
+            row("gain relative to the model", "", self.gain),
         ]
     }
 }

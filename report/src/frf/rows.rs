@@ -41,8 +41,5 @@ pub fn quality(fit: &FrfFit) -> String {
     let mode = fit.mode.map_or(String::new(), |(damping, hertz)| {
         format!("; the first mode then is at {hertz:.2} Hz with a damping ratio of {damping:.4}")
     });
-    format!(
-        "{} points, squares per degree of freedom {:.2} (1: noise explains what is left){mode}",
-        fit.points, fit.chi
-    )
+    format!("{} points, squares per degree of freedom {:.2} (1: residuals are noise){mode}", fit.points, fit.chi)
 }

@@ -136,7 +136,7 @@ pub fn elastic(mechanism: &Mechanism, modes: &Natural, mode: &ElasticMode) -> [S
     [
         format!("{} Hz", plain(mode.hertz())),
         damping,
-        format!("ways at the belt: {}", shape.join(", ")),
+        format!("mode shape at the belt: {}", shape.join(", ")),
         format!("energy: {}", energy.join(", ")),
     ]
 }

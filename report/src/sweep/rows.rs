@@ -49,7 +49,7 @@ pub fn influence(summary: &Summary, measured: &Measured, most: usize) -> String 
         }
     };
     match measured.shown_influence() {
-        none if none.is_empty() => "nothing that these runs show".into(),
+        none if none.is_empty() => "no significant parameter".into(),
         some => some.into_iter().take(most).map(told).collect::<Vec<_>>().join(", "),
     }
 }

@@ -211,22 +211,24 @@ pub fn ahead(work: &Work) -> Option<String> {
     let moves = tuned.after.moves.iter().zip(&ahead.verdict.moves).map(|(without, with)| {
         let error =
             |one: &MoveVerdict| format!("{} ({} at worst)", length(one.cart.peak.value.abs()), length(one.worst.0));
-        let mut words = format!("{} errs {}, {} without", with.name, error(with), error(without));
+        let mut words = format!("{}: error {} instead of {}", with.name, error(with), error(without));
         if with.settled.0 < without.settled.0 {
-            let _ = write!(words, ", and settles on {} axes, {} without", with.settled.0, without.settled.0);
+            let _ = write!(words, ", settles on {} axes instead of {}", with.settled.0, without.settled.0);
         }
         words
     });
     let moves: Vec<String> = moves.collect();
-    Some(format!("Feed-forward pays: {}. Write `feed_forward = {}` in [controller]", moves.join("; "), ahead.text()))
+    Some(format!("Feed-forward helps: {}. Write `feed_forward = {}` in [controller]", moves.join("; "), ahead.text()))
 }
 
 /// Why gains are worse than those of the file.
 fn reason(forced: &Forced) -> String {
     let place = format!("by {:.1} Hz with the cart at {:.0} mm", forced.mode, 1e3 * forced.place);
     match (forced.limit, forced.standing) {
-        (Limit::Bandwidth, _) => format!("They are placed for {:.1} Hz, not searched for", forced.mode),
-        (limit, Standing::WayBack) => format!("The limit of {} forces it, {place}", limit.word()),
+        (Limit::Bandwidth, _) => {
+            format!("The gains come from pole placement at {:.1} Hz, without a search", forced.mode)
+        }
+        (limit, Standing::WayBack) => format!("The limit of {} is the cause, {place}", limit.word()),
         (limit, Standing::File) => {
             format!(
                 "The gains of the file break the limit of {} {place}, and no gains were found that keep it without a worse figure",
@@ -244,26 +246,24 @@ fn least(work: &Work) -> String {
     let name = motion.map_or(&at_rest, |motion| &work.tuned.moves[motion].name);
     let what = match figure {
         Figure::Hunting => hunts(after, before),
-        Figure::Error => format!("errs {}, {} before", length(after), length(before)),
-        Figure::Settling => format!("settles after {:.0} ms, {:.0} ms before", 1e3 * after, 1e3 * before),
-        Figure::Settled => format!("settles on {after} axes, {before} before"),
+        Figure::Error => format!("error {} ({} before)", length(after), length(before)),
+        Figure::Settling => format!("settles after {:.0} ms ({:.0} ms before)", 1e3 * after, 1e3 * before),
+        Figure::Settled => format!("settles on {after} axes ({before} before)"),
     };
     let which = if least.design == work.tuned.after.design { "these" } else { "`least_worse` in tune.json" };
-    format!(
-        ". Of all gains within the limits that were judged {which} are the least worse in their worst figure: {name} {what}"
-    )
+    format!(". Of the gains that keep the limits, {which} have the smallest deterioration: {name}: {what}")
 }
 
 /// The change of a move at worst, in words; none where there is none.
 fn change(was: &MoveVerdict, is: &MoveVerdict) -> Option<String> {
     let mut words = Vec::new();
     if was.worst.0 != is.worst.0 {
-        words.push(format!("errs {} at worst, {} before", length(is.worst.0), length(was.worst.0)));
+        words.push(format!("worst-case error {} ({} before)", length(is.worst.0), length(was.worst.0)));
     }
     if was.settled.0 != is.settled.0 {
-        words.push(format!("settles on {} of {} axes, {} before", is.settled.0, is.settled.1, was.settled.0));
+        words.push(format!("settles on {} of {} axes ({} before)", is.settled.0, is.settled.1, was.settled.0));
     }
-    (!words.is_empty()).then(|| format!("{} {}", was.name, words.join(" and ")))
+    (!words.is_empty()).then(|| format!("{}: {}", was.name, words.join(", ")))
 }
 
 /// The first sentence on the gains of the file: that they break the limits themselves.
@@ -332,7 +332,7 @@ fn hunts(after: f64, before: f64) -> String {
 fn swing(amplitude: f64) -> String {
     match amplitude {
         0.0 => "not".into(),
-        _ if amplitude.is_nan() => "a slip that was not waited for".into(),
+        _ if amplitude.is_nan() => "slips too rare to be simulated".into(),
         _ => format!("± {}", length(amplitude)),
     }
 }

@@ -92,7 +92,7 @@ impl Certificate {
             };
             return Ok(Self { violation: Some(violation.clone()), ..Self::none(reason) });
         }
-        let own = Self { violation, ..Self::none("its budget was spent") };
+        let own = Self { violation, ..Self::none("search budget exhausted") };
         let because = |reason: &str| Ok(Self { reason: Some(reason.into()), ..own.clone() });
         if feedback.uses_current() {
             return because("a controller that uses the measured current is not covered");
