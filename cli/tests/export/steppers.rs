@@ -200,7 +200,7 @@ fn what_a_stepper_cannot_follow_is_a_status() {
         write_doubles(&folder.path().join("in.bin"), vec![command; drawn.commands[0].len()]);
         assert_eq!(try_to(folder.path(), &folder.path().join("here"), &[]).status.code(), Some(status), "{command}");
     }
-    for (target, part, word) in [("c", "controller", "without a controller"), ("st", "controller", "stepper")] {
+    for (target, part, word) in [("c", "controller", "no controller"), ("st", "controller", "stepper")] {
         let output = taut(folder.path(), &["export", target, "case.toml", "--part", part, "--out", "other.c"]);
         assert!(!output.status.success());
         let told = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -1,7 +1,7 @@
 /* Terms of sine and cosine beyond the first one, which are enough for an eighth of a turn. */
 #define CIRCULAR @circular@U
 /* The farthest a field is told to turn: further, its place would not be known to a microstep. */
-#define MOST_TURNS R(@turns@)
+#define MOST_TURNS @turns@
 
 static int32_t nearest(@name@_real x)
 {

@@ -13,19 +13,17 @@
 //!
 //! The integral bounds how far bristles slip meanwhile.
 
-use super::Core;
-use super::field::Field;
+use super::linear::States;
 use super::model::{Model, Vector};
 use super::sources::Source;
-use super::stretch::Stretch;
 use crate::friction::{Law, Motion};
-use crate::mechanism::{BODIES, DRIVES, Equations, Mode};
+use crate::mechanism::{BODIES, Equations, Mode};
 
 /// How far bodies and currents may be from rest, as a share of the tolerance.
 const SHARE: f64 = 0.1;
 
 /// Least value of a guard that an oscillation so small cannot bring to zero, as a share of its parts.
-const FAR: f64 = 1e-6;
+pub(super) const FAR: f64 = 1e-6;
 
 /// A body that bristles hold, with all that moves with it.
 struct Held {
@@ -87,8 +85,8 @@ impl Calm {
         (!held.is_empty()).then_some(Self { held, decay, currents })
     }
 
-    /// True if nothing moves by more than its share of `absolute` any more.
-    fn holds(&self, field: &Field, input: &[f64; DRIVES], y: &Vector, absolute: &Vector) -> bool {
+    /// True if nothing moves by more than its share of `absolute` any more; `rate` is asked for where speeds are small.
+    pub(super) fn holds(&self, y: &Vector, absolute: &Vector, rate: impl FnOnce() -> States) -> bool {
         let is_small = |twice: f64| {
             self.held.iter().all(|body| {
                 let far = (twice / body.stiffness).sqrt() + (twice / body.mass).sqrt() / self.decay;
@@ -99,28 +97,14 @@ impl Calm {
         if !is_small(kinetic) {
             return false;
         }
-        let rate = field.rate(input, y);
+        let rate = rate();
         let of_force = |body: &Held| (body.mass * rate[body.speed]).powi(2) / body.stiffness;
         let decayed = |&(place, decay): &(usize, f64)| rate[place].abs() <= SHARE * absolute[place] * decay;
-        is_small(kinetic + self.held.iter().map(of_force).sum::<f64>())
-            && self.currents.iter().all(decayed)
-            && field
-                .guards(input, y)
-                .iter()
-                .take(field.watches.len())
-                .enumerate()
-                .all(|(index, value)| *value > FAR * field.size(index, input, y))
+        is_small(kinetic + self.held.iter().map(of_force).sum::<f64>()) && self.currents.iter().all(decayed)
     }
-}
 
-impl Core {
-    /// True if everything has come to rest until the input changes; what still oscillated has no speed then.
-    pub(super) fn comes_to_rest(&mut self, field: &Field, stretch: &Stretch) -> bool {
-        let Some(calm) = &field.calm else { return false };
-        if stretch.degree > 0 || !calm.holds(field, &stretch.input(self.tau), &self.y, &self.absolute) {
-            return false;
-        }
-        calm.held.iter().flat_map(|body| &body.followers).for_each(|&speed| self.y[speed] = 0.0);
-        true
+    /// The places of the speeds of the bodies.
+    pub(super) fn speeds(&self) -> impl Iterator<Item = usize> {
+        self.held.iter().flat_map(|body| body.followers.iter().copied())
     }
 }

@@ -1,5 +1,6 @@
 //! Stepping: step lengths by error, guards, events.
 
+use super::calm::FAR;
 use super::fall;
 use super::field::Field;
 use super::linear::{EIGHTHS, Set};
@@ -115,6 +116,19 @@ impl Core {
         self.cost.evaluations += room.evaluations - evaluations;
         self.room = Some(room);
         hit
+    }
+
+    /// True if everything has come to rest until the input changes; what still oscillated has no speed then.
+    fn comes_to_rest(&mut self, field: &Field, stretch: &Stretch) -> bool {
+        let Some(calm) = field.calm.as_ref().filter(|_| stretch.degree == 0) else { return false };
+        let input = stretch.input(self.tau);
+        let is_far = |(index, value): (usize, &f64)| *value > FAR * field.size(index, &input, &self.y);
+        let is_at_rest = calm.holds(&self.y, &self.absolute, || field.rate(&input, &self.y))
+            && field.guards(&input, &self.y).iter().take(field.watches.len()).enumerate().all(is_far);
+        if is_at_rest {
+            calm.speeds().for_each(|speed| self.y[speed] = 0.0);
+        }
+        is_at_rest
     }
 
     /// Stays where it is until the end of the stretch.
