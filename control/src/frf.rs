@@ -53,6 +53,7 @@ use crate::error::{Error, Result};
 use crate::linear::within_travel;
 use crate::log::{Log, Quantity};
 use crate::machine::{EncoderPlace, Kind, Machine};
+use crate::signal::Hold;
 use nalgebra::Complex;
 use spectra::{Row, Spectra};
 use std::f64::consts::PI;
@@ -102,6 +103,8 @@ pub struct Frf {
     pub quantity: Quantity,
     /// Sample interval, s.
     pub every: f64,
+    /// The input between samples.
+    pub hold: Hold,
     /// Number of segments or periods.
     pub segments: usize,
     /// Number of samples in each.
@@ -186,6 +189,7 @@ pub fn estimate_all(kind: Kind, logs: &[&Log], cut: &Cut) -> Result<(Vec<Frf>, V
                 alike: median(&mut alike),
                 quantity,
                 every: spectra.every,
+                hold: spectra.hold,
                 segments: spectra.segments(),
                 length: spectra.length,
                 periodic: spectra.periodic,
@@ -281,15 +285,29 @@ pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
         return Err(Error::new("this case has no log to measure a response from")
             .next(format!("give an experiment log = {{ file = \"log.csv\", time = \"t\", {such_as} }}")));
     }
-    let (frfs, warnings) = estimate_all(machine.kind, &logs, cut)?;
+    let (frfs, mut warnings) = estimate_all(machine.kind, &logs, cut)?;
     let kinematic: Vec<Frf> = frfs.iter().filter(|frf| is_kinematic(frf.quantity)).cloned().collect();
     let fit = fit(machine, &known, &kinematic);
+    if let Ok(fit) = &fit
+        && fit.is_far()
+    {
+        warnings.push(format!(
+            "the fitted responses miss the measured ones by {:.3} times what noise explains, so the intervals are not to be \
+             relied on: check `hold` of the log, its delay, and what the model lacks",
+            fit.chi.sqrt()
+        ));
+    }
     let mut fitted = fit.as_ref().map(|fit| fit.curves.clone()).unwrap_or_default().into_iter();
     let mut responses = Vec::new();
     for frf in &frfs {
         let model = fit::model(machine, &known, frf).unwrap_or_default();
         let fitted = if is_kinematic(frf.quantity) { fitted.next().unwrap_or_default() } else { Vec::new() };
-        responses.push(Response { frf: frf.clone(), model, fitted, margins: margins_of(case, frf, &frfs) });
+        responses.push(Response {
+            frf: frf.clone(),
+            model,
+            fitted,
+            margins: margins_of(case, frf, &frfs, fit.as_ref().ok()),
+        });
     }
     Ok(Measurement { known, responses, warnings, fit })
 }
@@ -315,8 +333,9 @@ fn measured_by(machine: &Machine, drive: usize) -> Vec<String> {
 }
 
 /// Margins of the case's controllers, if this is the response of the position measured by its drive's controller, and
-/// those of the other drives were measured with it.
-fn margins_of(case: &Case, frf: &Frf, all: &[Frf]) -> Option<Measured> {
+/// those of the other drives were measured with it. A delay of the controller that the fit does not find in the logs is
+/// added.
+fn margins_of(case: &Case, frf: &Frf, all: &[Frf], fit: Option<&FrfFit>) -> Option<Measured> {
     let (design, machine) = (case.controller.as_ref()?, &case.machine);
     if !measured_by(machine, frf.drive).iter().any(|name| name == frf.quantity.name()) {
         return None;
@@ -335,5 +354,9 @@ fn margins_of(case: &Case, frf: &Frf, all: &[Frf]) -> Option<Measured> {
     let row = |row: usize| drives.clone().map(|drive| response(row, drive)).collect::<Option<Vec<_>>>();
     let matrix = drives.clone().map(row).collect::<Option<Vec<_>>>()?;
     let length = if measures_cart(machine) { 1.0 } else { machine.pulley_radius };
-    measured(&matrix, frf.drive, design, machine, length).ok()
+    let late = fit.map_or(0.0, |fit| {
+        let (found, [low, high]) = fit.delay;
+        if (low..=high).contains(&design.delay) { 0.0 } else { design.delay - found }
+    });
+    measured(&matrix, frf.drive, design, machine, (length, late)).ok()
 }

@@ -313,7 +313,7 @@ impl Planner<'_> {
             }
             slowed += 1;
             let shaped = self.design.shaped(&profiles);
-            let required = of_belt(&loads(&self.family.machine, self.design.limit, &shaped, INSTANTS));
+            let required = of_belt(&loads(&self.family.machine, self.design.bounds(), &shaped, INSTANTS));
             let taken = self.run(search.motion, &profiles, &two_sided(machine))?;
             belt = AIMED * required.min(belt) / of_belt(&loads_of_run(&self.family.machine, &taken.spans)).max(1.0);
             limits = match self.limits(search, periods, Share { motor, belt })? {
@@ -354,7 +354,7 @@ impl Planner<'_> {
     fn loads(&self, profiles: &[Profile], closely: impl Fn(&[Load]) -> usize) -> Vec<Load> {
         let mut all: Vec<Load> = Vec::new();
         for (machine, _) in &self.machines {
-            let at = |instants: usize| loads(machine, self.design.limit, profiles, instants);
+            let at = |instants: usize| loads(machine, self.design.bounds(), profiles, instants);
             let few = at(INSTANTS);
             let own = match closely(&few) {
                 INSTANTS => few,
@@ -432,7 +432,7 @@ impl Planner<'_> {
     /// Minimum time of all legs of the rigid axis, with their rests.
     fn bound(&self, way: &Way) -> Option<f64> {
         let [mut from] = way.start[..] else { return None };
-        let limits = limits(&self.family.machine, self.design.limit);
+        let limits = limits(&self.family.machine, self.design.bounds());
         let rigid = Rigid::of(&self.family.machine);
         let mut time = 0.0;
         for leg in &way.legs {

@@ -31,6 +31,15 @@ pub struct Design {
     pub shaper: Vec<[f64; 2]>,
 }
 
+/// Limits that a controller sets itself: of its command, V or A, and of the reference of its current loop, A.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Bounds {
+    /// Largest magnitude of the command, V or A.
+    pub command: Option<f64>,
+    /// Largest magnitude of the reference current, A.
+    pub current: Option<f64>,
+}
+
 impl Design {
     /// The design of steppers, which follow their references without feedback, through this shaper; `every` is the
     /// interval between rows, s.
@@ -45,6 +54,15 @@ impl Design {
             filters: Vec::new(),
             shaper,
         }
+    }
+
+    /// The limits that it sets itself.
+    pub fn bounds(&self) -> Bounds {
+        let current = match &self.structure {
+            Structure::Cascade(gains) => gains.current.and_then(|current| current.limit),
+            _ => None,
+        };
+        Bounds { command: self.limit, current }
     }
 
     /// References after its shaper.

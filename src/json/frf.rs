@@ -52,6 +52,7 @@ fn response(one: &Response) -> Value {
             "sensitivity_at_most": number(m.sensitivity_at_most),
             "phase_margin_rad": m.phase.map(|phase| phase.0),
             "gain_margin": m.gain.map(|gain| gain.0),
+            "added_delay_s": m.late,
             "from_Hz": m.range[0] / (2.0 * PI),
             "to_Hz": m.range[1] / (2.0 * PI),
         })

@@ -14,7 +14,8 @@ pub(super) fn limits(case: &Case, directions: &[Direction], origin: &Place, note
     let inputs = case.experiments.iter().flat_map(|done| done.inputs.iter().map(|input| (input, done.until)));
     let most = most(case.controller.as_ref().and_then(|design| design.limit), inputs);
     let r = machine.pulley_radius;
-    let power = |unit: &crate::machine::DriveUnit| Power::of(&unit.motor, &unit.amplifier, r, most.as_ref());
+    let held = case.controller.as_ref().and_then(|design| design.bounds().current);
+    let power = |unit: &crate::machine::DriveUnit| Power::of(&unit.motor, &unit.amplifier, r, (most.as_ref(), held));
     let Some(powers) = machine.drives.iter().map(power).collect::<Option<Vec<_>>>() else {
         let text = "nothing bounds the input: give amplifier.voltage_limit or current_limit to see the largest speed and \
                     acceleration";
@@ -133,8 +134,14 @@ fn most<'a>(limit: Option<f64>, inputs: impl Iterator<Item = (&'a Signal, f64)>)
 }
 
 impl Power {
-    /// Of a drive with the largest input that it gets, or none; and what limits it, in words.
-    pub fn of(motor: &Motor, amplifier: &Amplifier, r: f64, most: Option<&Most>) -> Option<(Self, String)> {
+    /// Of a drive with the largest input that it gets, or none, and the limit of a current loop, A; and what limits it,
+    /// in words.
+    pub fn of(
+        motor: &Motor,
+        amplifier: &Amplifier,
+        r: f64,
+        (most, held): (Option<&Most>, Option<f64>),
+    ) -> Option<(Self, String)> {
         let n = motor.gear_ratio;
         let per_ampere = motor.gear_efficiency * n * motor.torque_constant / r;
         let per_volt = per_ampere / motor.resistance;
@@ -170,6 +177,11 @@ impl Power {
         }
         if amplifier.current_limit.is_some() && amperes == amplifier.current_limit {
             words.push("amplifier.current_limit");
+        }
+        if let Some(held) = held.filter(|held| amperes.is_none_or(|amperes| *held < amperes)) {
+            words.retain(|word| *word != "amplifier.current_limit");
+            words.push("the limit of the controller's current loop");
+            amperes = Some(held);
         }
         let of_volts = volts.map(|volts| per_volt * volts);
         let of_amperes = amperes.map(|amperes| per_ampere * amperes);

@@ -56,7 +56,7 @@ impl Move {
 
     /// The limits that its references exceed on a machine under this controller.
     pub fn shortfalls(&self, machine: &Machine, design: &Design) -> Vec<Shortfall> {
-        shortfalls(machine, design.limit, &self.references(design))
+        shortfalls(machine, design.bounds(), &self.references(design))
     }
 }
 

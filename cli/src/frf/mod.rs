@@ -4,11 +4,11 @@ mod table;
 
 use crate::args::Frf as Args;
 use crate::command::{Finished, Remark, Report};
-use crate::failure::Outcome;
+use crate::failure::{Outcome, Status};
 use crate::folder::{self, Folder};
 use std::f64::consts::PI;
 use std::fmt::Write;
-use taut::frf::{Cut, Known, Measurement, measure};
+use taut::frf::{Cut, FrfFit, Known, Measurement, measure};
 use taut::json;
 use taut_report::frf::{figures, page};
 
@@ -24,6 +24,9 @@ pub fn run(args: &Args) -> Outcome {
     let data = json::text(&json::frf(&case, &found));
     let advice = "add --out DIR for the responses as a table and a report";
     let mut finished = Finished::new("frf", ("frf.json", data), table::text(&case.title, &found), advice);
+    if found.fit.as_ref().is_ok_and(FrfFit::is_far) {
+        finished.status = Status::Incomplete;
+    }
     finished.remarks.extend(found.warnings.iter().cloned().map(Remark::Warning));
     if common.out.is_some() {
         finished.files.push(("frf.csv".into(), csv(&found)));

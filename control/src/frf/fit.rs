@@ -21,6 +21,7 @@ use crate::error::{Error, Result};
 use crate::linear::{Hold, Operation, StateSpace, System, placed};
 use crate::machine::{BeltModel, Machine, Spans};
 use crate::number::engineering;
+use crate::signal;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::PI;
 
@@ -135,15 +136,21 @@ fn curves(
                 .ok_or_else(|| Error::new(format!("the model has no {name}")).next("log another quantity"))
         };
         let outputs = same.iter().map(output).collect::<Result<Vec<_>>>()?;
-        let discrete = of_input.discrete(first.every, Hold::Zero, delay)?;
+        // A straight input is delayed by e^{−jωt_d}, which leaves out what folds down from beyond half the sample rate.
+        let (hold, within, late) = match first.hold {
+            signal::Hold::Zero => (Hold::Zero, delay, 0.0),
+            signal::Hold::Linear => (Hold::First, 0.0, delay),
+        };
+        let discrete = of_input.discrete(first.every, hold, within)?;
         let line = 2.0 * PI / (first.length as f64 * first.every);
         let sum: f64 = window.iter().map(|one| one.1).sum();
         let mut seen = vec![vec![Complex::ZERO; first.points.len()]; same.len()];
         for (k, point) in first.points.iter().enumerate() {
             for (distance, weight) in window {
-                let answers = discrete.at(point.omega + distance * line);
+                let omega = point.omega + distance * line;
+                let (answers, turned) = (discrete.at(omega), Complex::from_polar(weight / sum, -omega * late));
                 for (curve, output) in seen.iter_mut().zip(&outputs) {
-                    curve[k] += answers[*output] * (weight / sum);
+                    curve[k] += answers[*output] * turned;
                 }
             }
         }
@@ -323,7 +330,16 @@ fn minimised(problem: &Problem, mut x: Vec<f64>) -> Result<(f64, Vec<f64>)> {
     if squares.is_finite() { Ok((squares, x)) } else { Err(Error::new("no finite residuals")) }
 }
 
+/// χ² per degree of freedom above which the model does not describe the responses: residuals are more than three times
+/// what noise explains.
+const FAR: f64 = 10.0;
+
 impl FrfFit {
+    /// True if noise does not nearly explain the residuals.
+    pub fn is_far(&self) -> bool {
+        self.chi > FAR
+    }
+
     /// Results of the fit with units: name, value, ends of the interval.
     pub fn rows(&self) -> Vec<(&'static str, String, [String; 2])> {
         let shown = |value: f64, unit: &str| engineering(value, unit, 4);

@@ -5,6 +5,7 @@ use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
+use crate::number::engineering;
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
 
@@ -22,18 +23,21 @@ pub struct Measured {
     pub gain: Option<(f64, f64)>,
     /// True if it holds for small motions around rest only, since the controller is not linear.
     pub is_at_rest: bool,
+    /// Delay of the controller that the logs do not contain, s, and that is added; below zero if they contain more.
+    pub late: f64,
     /// Lowest and highest frequency evaluated, rad/s.
     pub range: [f64; 2],
 }
 
 /// Margins of a design with the responses of the positions measured by its drives, one row of `matrix` for each;
-/// `length` is metres per unit of these. Gain and phase margin belong to the loop of `drive`.
+/// `length` is metres per unit of these, `late` a delay that they do not contain, s. Gain and phase margin belong to the
+/// loop of `drive`.
 pub fn measured(
     matrix: &[Vec<&Frf>],
     drive: usize,
     design: &Design,
     machine: &Machine,
-    length: f64,
+    (length, late): (f64, f64),
 ) -> Result<Measured> {
     let feedback = Feedback::new(design, machine)?;
     let own = matrix[drive][drive];
@@ -55,6 +59,7 @@ pub fn measured(
         phase: None,
         gain: None,
         is_at_rest: !feedback.is_linear(),
+        late,
         range: [first.0, last.0],
     };
     let mut before: Option<(f64, Complex<f64>)> = None;
@@ -68,7 +73,7 @@ pub fn measured(
             return Err(Error::new("a controller with two sensors needs the responses of both")
                 .next("leave its margins to taut tune"));
         }
-        let factor = terms.position / terms.own * length;
+        let factor = terms.position / terms.own * Complex::from_polar(length, -omega * late);
         let difference = DMatrix::identity(matrix.len(), matrix.len()) + g * factor;
         let far = difference.clone().singular_values().min();
         if 1.0 / far > found.sensitivity.0 {
@@ -134,6 +139,11 @@ impl Measured {
         let [low, high] = self.range.map(hertz);
         let (peak, at) = self.sensitivity;
         let at_rest = if self.is_at_rest { "at rest: " } else { "" };
-        format!("{at_rest}Ms {peak:.2} at {} ({most}); {phase}; {gain}; from {low} to {high}", hertz(at))
+        let late = match self.late {
+            0.0 => String::new(),
+            late if late > 0.0 => format!("; with {} of its delay that the log lacks", engineering(late, "s", 3)),
+            late => format!("; without {} of delay that only the log has", engineering(-late, "s", 3)),
+        };
+        format!("{at_rest}Ms {peak:.2} at {} ({most}); {phase}; {gain}; from {low} to {high}{late}", hertz(at))
     }
 }

@@ -4,6 +4,7 @@ use super::{Cut, Point};
 use crate::error::{Error, Result};
 use crate::log::Log;
 use crate::machine::Quantity;
+use crate::signal::Hold;
 use nalgebra::{Complex, DMatrix};
 use rustfft::FftPlanner;
 use std::f64::consts::PI;
@@ -52,6 +53,8 @@ pub(super) struct Spectra {
     pub length: usize,
     /// True if segments are periods.
     pub periodic: bool,
+    /// The inputs between samples.
+    pub hold: Hold,
     inputs: Vec<Signal>,
     /// Logged references that replace the inputs, if any.
     references: Option<Vec<Signal>>,
@@ -101,6 +104,11 @@ impl Spectra {
             ))
             .next("log with the same interval: these logs are taken together, for none moves all motors"));
         }
+        let hold = logs[0].hold;
+        if let Some(log) = logs.iter().find(|log| log.hold != hold) {
+            return Err(wrong(format!("\"{}\" and \"{}\" have another `hold`", logs[0].name, log.name))
+                .next("give these logs the same `hold`: they are taken together, for none moves all motors"));
+        }
         let shortest = logs.iter().map(|log| log.len()).min().unwrap_or_default();
         let (length, step) = segments(shortest, every, cut).map_err(|error| error.in_file(&place))?;
         let periodic = cut.period.is_some();
@@ -140,7 +148,7 @@ impl Spectra {
         }
         let references = logs[0].reference.is_some();
         let references = references.then(|| vec![all(&|log: &Log| log.reference.clone().unwrap_or_default())]);
-        let mut spectra = Self { name, every, length, periodic, inputs, references, outputs, lines: Vec::new() };
+        let mut spectra = Self { name, every, length, periodic, hold, inputs, references, outputs, lines: Vec::new() };
         spectra.lines = spectra.excited();
         Ok(spectra)
     }

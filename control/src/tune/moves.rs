@@ -100,7 +100,11 @@ fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
     let per_speed = push(1.0) - push(0.0);
     let speed = (SPEED * limit - push(0.0)) / per_speed.max(f64::MIN_POSITIVE);
     let speed = if speed > 0.0 { speed.min(MOST.0) } else { 0.1 * MODEST.0 };
-    let force = FORCE * (limit * rigid.force_per_command().abs() - dry - rigid.viscous[0] * speed);
+    // A current loop may have a limit of its own.
+    let held = design.bounds().current.map_or(f64::INFINITY, |amperes| amperes * rigid.force_per_ampere.abs());
+    let speed = speed.min(((SPEED * held - dry) / rigid.viscous[0]).max(0.1 * MODEST.0));
+    let most = (limit * rigid.force_per_command().abs()).min(held);
+    let force = FORCE * (most - dry - rigid.viscous[0] * speed);
     let acceleration = (force / rigid.accelerated()).min(MOST.1);
     (speed, if acceleration > 0.0 { acceleration } else { 0.1 * MODEST.1 })
 }

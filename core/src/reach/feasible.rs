@@ -4,7 +4,7 @@ use super::compensation::{Compensation, direction};
 use super::forward::Forward;
 use super::pull_out::Curve;
 use crate::calculator::Run;
-use crate::design::{FeedForward, FeedForwardModel};
+use crate::design::{Bounds, FeedForward, FeedForwardModel};
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Belt, BeltModel, Machine};
 use crate::metrics::Peak;
@@ -182,8 +182,8 @@ pub fn shortfalls_of_run(machine: &Machine, spans: &[[Peak; 2]], profile: &Profi
     Tension::of(&machine.belt).into_iter().filter_map(exceeded).collect()
 }
 
-/// Limits of this machine under a controller with this command limit (V or A).
-fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
+/// Limits of this machine under a controller with these limits.
+fn demands(machine: &Machine, bounds: Bounds) -> Vec<Demand> {
     let belt = &machine.belt;
     let carried = belt.sheet.mesh(machine.pulley_radius).and_then(|(_, carried)| carried);
     let teeth = carried.map(|carried| Demand {
@@ -194,12 +194,12 @@ fn demands(machine: &Machine, limit: Option<f64>) -> Vec<Demand> {
         words: ["takes", " at the drive pulley", "; the teeth in mesh carry"],
     });
     let of_belt = Tension::of(belt).into_iter().map(Tension::demand).chain(teeth);
-    of_motor(machine, 0, limit).into_iter().chain(of_belt).collect()
+    of_motor(machine, 0, bounds).into_iter().chain(of_belt).collect()
 }
 
-/// Demands on a motor under a controller with this command limit (V or A).
-fn of_motor(machine: &Machine, drive: usize, limit: Option<f64>) -> Vec<Demand> {
-    let (volts, amperes) = limits_of(machine, drive, limit);
+/// Demands on a motor under a controller with these limits.
+fn of_motor(machine: &Machine, drive: usize, bounds: Bounds) -> Vec<Demand> {
+    let (volts, amperes) = limits_of(machine, drive, bounds);
     electrical(volts, amperes).into_iter().chain(pull_out(machine, drive)).collect()
 }
 
@@ -230,43 +230,43 @@ fn electrical(volts: Option<f64>, amperes: Option<f64>) -> Vec<Demand> {
 }
 
 /// Largest use of each limit by references, evaluated at `instants` times; of several drives, the most loaded one.
-pub fn loads(machine: &Machine, limit: Option<f64>, profiles: &[Profile], instants: usize) -> Vec<Load> {
+pub fn loads(machine: &Machine, bounds: Bounds, profiles: &[Profile], instants: usize) -> Vec<Load> {
     let load = |needs: &[Need], demand: Demand| {
         let [needed, allowed] = demand.most(needs).map_or([0.0, 1.0], |(_, both)| both);
         Load { limit: demand.limit, unit: demand.unit, needed: needed.max(0.0), allowed }
     };
     if let [profile] = profiles {
         let needs = needs(machine, profile, instants);
-        return demands(machine, limit).into_iter().map(|demand| load(&needs, demand)).collect();
+        return demands(machine, bounds).into_iter().map(|demand| load(&needs, demand)).collect();
     }
     let mut all: Vec<Load> = Vec::new();
     for drive in 0..machine.drives.len() {
         let needs = needs_of_drive(machine, drive, profiles, instants);
-        of_motor(machine, drive, limit).into_iter().for_each(|demand| load(&needs, demand).join(&mut all));
+        of_motor(machine, drive, bounds).into_iter().for_each(|demand| load(&needs, demand).join(&mut all));
     }
     all
 }
 
-/// Limits that `profile`, shaper included, exceeds on this machine under a controller with this command limit (V or A);
+/// Limits that `profile`, shaper included, exceeds on this machine under a controller with these limits;
 /// none if the reference can be followed. Friction is taken as viscous plus Coulomb, the idler's own mode as
 /// quasi-static.
 ///
 /// With several drives, voltage and current of each are checked with rigid belts.
-pub fn shortfalls(machine: &Machine, limit: Option<f64>, profiles: &[Profile]) -> Vec<Shortfall> {
+pub fn shortfalls(machine: &Machine, bounds: Bounds, profiles: &[Profile]) -> Vec<Shortfall> {
     let of_drives: Vec<Shortfall> = match profiles {
-        [profile] => of_axis(machine, limit, profile),
-        _ => (0..machine.drives.len()).flat_map(|drive| of_drive(machine, limit, drive, profiles)).collect(),
+        [profile] => of_axis(machine, bounds, profile),
+        _ => (0..machine.drives.len()).flat_map(|drive| of_drive(machine, bounds, drive, profiles)).collect(),
     };
     let slides = profiles.iter().enumerate();
-    let of_slides = slides.flat_map(|(number, profile)| of_slide(machine, limit, number, profile));
+    let of_slides = slides.flat_map(|(number, profile)| of_slide(machine, bounds, number, profile));
     of_drives.into_iter().chain(of_slides).collect()
 }
 
 /// Limits exceeded at one drive of a machine with several.
-fn of_drive(machine: &Machine, limit: Option<f64>, drive: usize, profiles: &[Profile]) -> Vec<Shortfall> {
+fn of_drive(machine: &Machine, bounds: Bounds, drive: usize, profiles: &[Profile]) -> Vec<Shortfall> {
     let needs = needs_of_drive(machine, drive, profiles, INSTANTS);
     let name = machine.geometry().drives[drive].label.name;
-    let exceeded = of_motor(machine, drive, limit).into_iter().filter_map(|demand| exceeded(&needs, &demand));
+    let exceeded = of_motor(machine, drive, bounds).into_iter().filter_map(|demand| exceeded(&needs, &demand));
     exceeded.map(|short| Shortfall { words: format!("{name}: {}", short.words), ..short }).collect()
 }
 
@@ -285,11 +285,11 @@ fn needs_of_drive(machine: &Machine, drive: usize, profiles: &[Profile], instant
     (0..=instants).map(need).collect()
 }
 
-fn of_axis(machine: &Machine, limit: Option<f64>, profile: &Profile) -> Vec<Shortfall> {
+fn of_axis(machine: &Machine, bounds: Bounds, profile: &Profile) -> Vec<Shortfall> {
     let needs = needs(machine, profile, INSTANTS);
-    let (volts, _) = limits(machine, limit);
+    let (volts, _) = limits(machine, bounds);
     let mut found: Vec<Shortfall> = Vec::new();
-    for demand in demands(machine, limit) {
+    for demand in demands(machine, bounds) {
         let by_speed = if demand.limit == "voltage" { of_speed(machine, volts, &needs) } else { None };
         found.extend(by_speed.or_else(|| exceeded(&needs, &demand)));
     }
@@ -364,11 +364,11 @@ fn of_speed(machine: &Machine, volts: Option<f64>, needs: &[Need]) -> Option<Sho
 }
 
 /// Limits that the reference of one slide exceeds; with several slides the message names it.
-fn of_slide(machine: &Machine, limit: Option<f64>, number: usize, profile: &Profile) -> Vec<Shortfall> {
+fn of_slide(machine: &Machine, bounds: Bounds, number: usize, profile: &Profile) -> Vec<Shortfall> {
     let end = profile.rest();
     let at = |time: f64| Instant { time, y: profile.at(time) };
     let instants: Vec<Instant> = (0..=INSTANTS).map(|k| at(end * k as f64 / INSTANTS as f64)).collect();
-    let found = [of_breakaway(machine, limit, number, &instants), of_travel(machine, number, &instants)];
+    let found = [of_breakaway(machine, bounds, number, &instants), of_travel(machine, number, &instants)];
     let body = machine.geometry().slides[number].body;
     let name = machine.bridge.as_ref().map(|_| machine.geometry().label(body).name);
     let named = |short: Shortfall| match name {
@@ -379,12 +379,12 @@ fn of_slide(machine: &Machine, limit: Option<f64>, number: usize, profile: &Prof
 }
 
 /// Breakaway force of a slide with everything that turns with it, if the motors give less at standstill.
-fn of_breakaway(machine: &Machine, limit: Option<f64>, number: usize, instants: &[Instant]) -> Option<Shortfall> {
+fn of_breakaway(machine: &Machine, bounds: Bounds, number: usize, instants: &[Instant]) -> Option<Shortfall> {
     let at_standstill = |drive: usize| {
         if let Some(curve) = Curve::of(&machine.drives[drive]) {
             return Some(curve.torque(0.0) / machine.pulley_radius);
         }
-        let (volts, amperes) = limits_of(machine, drive, limit);
+        let (volts, amperes) = limits_of(machine, drive, bounds);
         let (current, voltage) = Rigid::of_pulley(machine, drive).electrical(1.0, 0.0, &Reference::default());
         let force = [volts.map(|volts| volts / voltage), amperes.map(|amperes| amperes / current)];
         force.into_iter().flatten().reduce(f64::min)
@@ -422,17 +422,19 @@ pub fn sentence(name: &str, short: &[Shortfall]) -> String {
 }
 
 /// The tightest limits of voltage and current, V and A, of the first drive.
-pub fn limits(machine: &Machine, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
-    limits_of(machine, 0, limit)
+pub fn limits(machine: &Machine, bounds: Bounds) -> (Option<f64>, Option<f64>) {
+    limits_of(machine, 0, bounds)
 }
 
 /// Tightest limits of voltage and current of any drive, V and A.
-fn limits_of(machine: &Machine, drive: usize, limit: Option<f64>) -> (Option<f64>, Option<f64>) {
+fn limits_of(machine: &Machine, drive: usize, bounds: Bounds) -> (Option<f64>, Option<f64>) {
     let amplifier = &machine.drives[drive].amplifier;
-    let commanded = limit.map(|limit| limit * amplifier.gain.abs());
+    let commanded = bounds.command.map(|limit| limit * amplifier.gain.abs());
     let least = |a: Option<f64>, b: Option<f64>| a.into_iter().chain(b).reduce(f64::min);
     match amplifier.mode {
-        AmplifierMode::Voltage => (least(amplifier.voltage_limit, commanded), amplifier.current_limit),
+        AmplifierMode::Voltage => {
+            (least(amplifier.voltage_limit, commanded), least(amplifier.current_limit, bounds.current))
+        }
         // Its limit is the pull-out torque.
         AmplifierMode::Position => (None, None),
         AmplifierMode::Current => (amplifier.voltage_limit, least(amplifier.current_limit, commanded)),

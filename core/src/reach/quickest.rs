@@ -168,13 +168,13 @@ impl Quickest<'_> {
     pub fn check(&self, way: &Way) -> Result<()> {
         let slow = Limits { speed: 1e-3, acceleration: 1e-2, jerk: None, snap: None };
         let references = self.design.shaped(&way.within(&slow)?);
-        let short = shortfalls(self.machine, self.design.limit, &references);
+        let short = shortfalls(self.machine, self.design.bounds(), &references);
         // A motor that cannot break the axis away needs no word about its voltage.
         let breakaway = short.iter().find(|short| short.limit == "breakaway");
         if let Some(short) = breakaway.or(short.first()) {
             return Err(Error::new(format!("there is no plan: {}", short.words)));
         }
-        let (volts, amperes) = limits(self.machine, self.design.limit);
+        let (volts, amperes) = limits(self.machine, self.design.bounds());
         let is_limited = volts.is_some() || amperes.is_some() || self.machine.stepper().is_some();
         if !is_limited && (self.wanted.speed.is_none() || self.wanted.acceleration.is_none()) {
             return Err(Error::new("there is no plan: neither voltage nor current is limited")
@@ -220,7 +220,7 @@ impl Quickest<'_> {
             let Some(limits) = self.searched(way, periods, share) else { return Ok(None) };
             let profiles = self.design.shaped(&way.within(&limits)?);
             // On the finer grid of instants, the axis needs slightly more than during the search.
-            let closely = loads(self.machine, self.design.limit, &profiles, CLOSELY);
+            let closely = loads(self.machine, self.design.bounds(), &profiles, CLOSELY);
             let others = others(&profiles);
             let own = closely.iter().map(|load| (load, wanted.of(load)));
             let mut most = Share { motor: 0.0, belt: 0.0 };
@@ -307,7 +307,7 @@ impl Quickest<'_> {
     /// True if a move within these limits uses at most these fractions of the limits of the machine.
     fn is_within(&self, way: &Way, limits: &Limits, share: Share) -> bool {
         let Ok(profiles) = way.within(limits) else { return false };
-        let loads = loads(self.machine, self.design.limit, &self.design.shaped(&profiles), INSTANTS);
+        let loads = loads(self.machine, self.design.bounds(), &self.design.shaped(&profiles), INSTANTS);
         loads.iter().all(|load| load.share() <= share.of(load))
     }
 }
