@@ -594,3 +594,22 @@ fn gains_for_drives_make_the_same_command() {
     let inertia = value("P-AXIS-00391 load") - value("3140:07 load inertia");
     assert_eq!(inertia, machine.drives[0].motor.rotor_inertia);
 }
+
+/// The limit of a current loop bounds what a machine can follow, as that of the amplifier does.
+#[test]
+fn a_current_loop_with_a_limit_cannot_follow_more() {
+    let read = |changes: &[&str]| Case::read_with("stages/sollmann-jouaneh/controllers/cascade-current.toml", changes);
+    let limits = |case: &Case| -> Vec<(String, f64)> {
+        let found = case.shortfalls().into_iter().flat_map(|(name, short)| {
+            short.into_iter().map(move |short| (format!("{name}: {}", short.limit), short.allowed))
+        });
+        found.collect()
+    };
+    let (free, own) = (read(&[]).unwrap(), read(&["controller.cascade.current.limit=2 A"]).unwrap());
+    let amplifier = read(&["amplifier.current_limit=2 A"]).unwrap();
+    assert!(limits(&free).is_empty(), "{:?}", limits(&free));
+    assert!(
+        !limits(&own).is_empty() && limits(&own).iter().all(|(limit, most)| limit.ends_with("current") && *most == 2.0)
+    );
+    assert_eq!(limits(&own), limits(&amplifier));
+}

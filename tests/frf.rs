@@ -166,6 +166,65 @@ fn stiffness_damping_and_delay() {
     assert!(low < 1.3 && 1.3 < high && high - low < 0.05, "{low} {high}");
 }
 
+/// A log whose input is straight between samples, for which the model of a held one would be 17 % too stiff.
+#[test]
+fn a_straight_input_is_modelled_as_such() {
+    let mut machine = stage();
+    machine.belt.stiffness = machine.belt.stiffness.map(|k| 1.2 * k);
+    let system = StateSpace::of(&machine, Operation::default()).unwrap();
+    let discrete = system.discrete(EVERY, Hold::First, 0.0).unwrap();
+    let output = system.output("drive_angle").unwrap();
+    let (input, samples) = (white(60_000, 3.0), 60_000);
+    let mut x = DVector::zeros(discrete.a.nrows());
+    let mut made = log(&model(&machine, 0.0), &input, None, 0.0, samples);
+    made.hold = taut::signal::Hold::Linear;
+    let mut chance = Chance(9);
+    for (k, seen) in made.outputs[0].values.iter_mut().enumerate() {
+        *seen = (discrete.c.row(output) * &x)[(0, 0)] + discrete.d[output] * input(k) + 2e-6 * chance.next();
+        x = &discrete.a * &x + &discrete.b * input(k);
+    }
+    let cut = Cut { segment: Some(1.024), period: None };
+    let known = Known { place: 0.0, bridge: 0.0, delay: 0.0 };
+    let found = |log: &Log| fit(&stage(), &known, &estimate(log, &cut).unwrap()).unwrap();
+    let right = found(&made);
+    let (stiffness, [low, high]) = right.stiffness;
+    assert!((stiffness / 1.2 - 1.0).abs() < 0.01 && low < 1.2 && 1.2 < high, "{:?}", right.stiffness);
+    assert!(right.delay.0 < 1e-5 && !right.is_far(), "{:?}, {}", right.delay, right.chi);
+    // Taken as held, it is not described, which is said.
+    let wrong = found(&Log { hold: taut::signal::Hold::Zero, ..made });
+    assert!(wrong.is_far() && !(wrong.stiffness.1[0]..wrong.stiffness.1[1]).contains(&1.2), "{:?}", wrong.stiffness);
+}
+
+/// A controller's delay that is not in the log is in its margins: they are those of a log that has it.
+#[test]
+fn a_delay_that_the_log_lacks_counts_in_margins() {
+    let folder = tempfile::tempdir().unwrap();
+    let stage = stage();
+    let text = include_str!("../stages/sollmann-jouaneh/controllers/pid.toml");
+    let design = text.split("[controller]").nth(1).unwrap().split("[[move]]").next().unwrap();
+    let machine = include_str!("../stages/sollmann-jouaneh/table4.toml").split("[[experiment]]").next().unwrap();
+    let margins = |delay_of_log: f64| {
+        let log = log(&model(&stage, delay_of_log), &white(60_000, 3.0), None, 1e-6, 60_000);
+        let rows = log.time.iter().zip(&log.inputs[0]).zip(&log.outputs[0].values);
+        let table: String = rows.map(|((t, u), y)| format!("{t:?},{u:?},{y:?}\n")).collect();
+        std::fs::write(folder.path().join("log.csv"), format!("t,u,phi\n{table}")).unwrap();
+        let case = format!(
+            "{machine}\n[encoder]\nat = \"drive_pulley\"\nlines = 500000\n[controller]{design}\n[[experiment]]\nname = \"log\"\n\
+             log = {{ file = \"log.csv\", time = \"t\", input = \"u\", drive_angle = \"phi\" }}\n"
+        );
+        let path = folder.path().join("case.toml");
+        std::fs::write(&path, case).unwrap();
+        let changes = ["controller.delay=0.5 ms", "belt.damping=[\"6.6 N s/m\", \"6.6 N s/m\", \"2.9 N s/m\"]"];
+        let case = Case::read_with(&path, &changes).unwrap();
+        let cut = Cut { segment: Some(1.024), period: None };
+        let found = measure(&case, &cut, Known::of(&case, None, None, None).unwrap()).unwrap();
+        found.responses[0].margins.expect("the encoder's own angle")
+    };
+    let [without, with] = [0.0, 0.5e-3].map(margins);
+    assert!((without.late - 0.5e-3).abs() < 1e-5 && with.late.abs() < 1e-5, "{} {}", without.late, with.late);
+    assert!((without.sensitivity.0 / with.sensitivity.0 - 1.0).abs() < 0.02, "{without:?} {with:?}");
+}
+
 /// Margins around what was measured are those around the model that made it.
 #[test]
 fn measured_margins() {
@@ -176,7 +235,7 @@ fn measured_margins() {
     let log = log(&truth, &white(120_000, 3.0), None, 1e-7, 120_000);
     let frf = &estimate(&log, &Cut { segment: Some(2.048), period: None }).unwrap()[0];
     let stage = stage();
-    let found = measured(&[vec![frf]], 0, &design, &stage, stage.pulley_radius).unwrap();
+    let found = measured(&[vec![frf]], 0, &design, &stage, (stage.pulley_radius, 0.0)).unwrap();
     let feedback = taut::control::feedback::Feedback::new(&design, &stage).unwrap();
     let [low, high] = found.range;
     let exact = (0..4000).map(|k| low + (high - low) * f64::from(k) / 4000.0).map(|omega| {

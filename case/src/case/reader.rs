@@ -6,6 +6,9 @@ use crate::error::{Error, Place, Result};
 use crate::parameter::{self, Fallback, Parameter};
 use crate::quantity::{self, rounded};
 
+/// Characters of an unknown key that its error repeats.
+const LONGEST_KEY: usize = 60;
+
 /// A value on the way to its meaning.
 #[derive(Clone)]
 pub(super) struct Field<'a> {
@@ -269,7 +272,11 @@ impl<'a> Table<'a> {
             if known.contains(&key) {
                 continue;
             }
-            let error = Error::new(format!("{} has no key `{key}`", self.title()))
+            let shown: String = match key.chars().nth(LONGEST_KEY) {
+                Some(_) => key.chars().take(LONGEST_KEY).chain("…".chars()).collect(),
+                None => key.into(),
+            };
+            let error = Error::new(format!("{} has no key `{shown}`", self.title()))
                 .at(place())
                 .allowed(known.iter().filter(|k| !planned.contains(k)).copied().collect::<Vec<_>>().join(", "));
             // What belongs to a table of an axis need not be there for a gantry.

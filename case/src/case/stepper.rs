@@ -13,7 +13,7 @@ const NO_MOTOR: [&str; 3] = [
     "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
     "[motor] and [amplifier]",
     "choose the moves of a stepper with `taut plan` and `taut shape`, since it has no controller; see what logs of \
-     moves determine with `taut check` and `taut fit`; export it with `taut export fmu` or `taut export json`",
+     moves determine with `taut check` and `taut fit`; export it with `taut export c`, `fmu` or `json`",
 ];
 
 /// Refuses a stepper where a motor that is commanded by voltage or current is needed.

@@ -131,7 +131,9 @@ fn version() -> &'static str {
 
 /// A text as a comment can hold it.
 pub(crate) fn plain(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>().replace("*/", "* /")
+    // Neither an end nor a trigraph.
+    let text: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    text.replace("*/", "* /").replace("??", "? ?").replace("??", "? ?")
 }
 
 /// A number as C has it.
