@@ -342,7 +342,9 @@ fn closed(
     }
     if nuisance.sensor_play.is_some() {
         return Err(field
-            .fail("the controller of a loop that is closed again receives exact positions, without the play of a sensor")
+            .fail(
+                "the controller of a loop that is closed again receives exact positions, without the play of a sensor",
+            )
             .next("leave `sensor_play` out of `nuisance`, or leave out `loop`"));
     }
     if nuisance.delay != Scope::Off || nuisance.input_offset != Scope::Off {
@@ -565,7 +567,8 @@ fn logged_position(field: &Field, machine: &Machine, logs: Option<&[Experiment]>
     let has = |experiment: &Experiment| {
         experiment.log.iter().flat_map(|log| &log.outputs).any(|output| output.quantity == quantity)
     };
-    match logs.is_none_or(|experiments| experiments.iter().any(has)) {
+    let logged: Vec<&Experiment> = logs.into_iter().flatten().filter(|experiment| experiment.log.is_some()).collect();
+    match logged.is_empty() || logged.into_iter().any(has) {
         true => Ok(Some(quantity)),
         false => Err(field
             .fail(format!("no log has an output `{}`", quantity.name()))

@@ -27,8 +27,7 @@ impl Problem<'_> {
             return false;
         }
         // What changes the readings alone needs no run.
-        let is_of_sensor =
-            |j: &&usize| self.extra_of((index, **j)).is_some_and(|extra| extra.what.is_of_sensor());
+        let is_of_sensor = |j: &&usize| self.extra_of((index, **j)).is_some_and(|extra| extra.what.is_of_sensor());
         let (of_sensor, movers): (Vec<usize>, Vec<usize>) = columns.iter().partition(is_of_sensor);
         let variables = |is_moved: bool| {
             let all = movers.iter().map(|&j| self.variable_of((index, j), x, bounds, is_moved));

@@ -56,11 +56,7 @@ impl SensorPlay {
 
     /// The derivatives of the reading, in place of those of the positions, by variables on which width and share
     /// depend as given: (dw, dc).
-    pub fn differentiate<'s>(
-        self,
-        positions: &[f64],
-        slopes: impl Iterator<Item = (&'s mut Vec<f64>, [f64; 2])>,
-    ) {
+    pub fn differentiate<'s>(self, positions: &[f64], slopes: impl Iterator<Item = (&'s mut Vec<f64>, [f64; 2])>) {
         let Self { width: w, ahead: c } = self;
         let (_, contacts) = self.contacts(positions);
         for (slopes, [dw, dc]) in slopes {

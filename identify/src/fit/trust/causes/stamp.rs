@@ -18,7 +18,9 @@ pub(super) fn delays(site: &Site) -> Vec<Extended> {
     let interval = site.found.problem.runs[0].interval();
     let suspected = suspected_delay(&site.found.problem);
     let starts = CAUSE_DELAYS.iter().map(|share| share * interval).chain(suspected);
-    let of = |delay: f64| Extended::new(site.with(site.machine.clone()), plan.clone(), Telling::Nuisance(Nuisance::Delay, delay));
+    let of = |delay: f64| {
+        Extended::new(site.with(site.machine.clone()), plan.clone(), Telling::Nuisance(Nuisance::Delay, delay))
+    };
     starts.map(of).collect()
 }
 
