@@ -467,6 +467,7 @@ impl Truth {
             Truth::Right | Truth::NarrowBand => &[],
             Truth::Spring | Truth::SpringAtMotor => &["spring"],
             Truth::Play => &["play"],
+            Truth::SensorPlay => &["sensor_play"],
             Truth::Late => &["delay"],
             Truth::LuGre => &["lugre"],
             Truth::Drag => &["drag"],
@@ -492,6 +493,7 @@ fn named(truth: Truth, seed: u64, is_told: bool, sum: &Mutex<Named>) {
     let codes = [
         "spring",
         "play",
+        "sensor_play",
         "delay",
         "limit",
         "inductance",

@@ -122,6 +122,34 @@ fn play_is_named_where_first_steps_suggest_a_spring() {
     }
 }
 
+/// Play of a sensor's coupling biased the mass by several standard errors without a word, or was told as bristles. With
+/// `sensor_play` in the case, its width and the values are estimated.
+#[test]
+fn play_of_a_sensor_is_named_with_its_width() {
+    for seed in 1..=5 {
+        let (found, values) = fitted(seed, Truth::SensorPlay);
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{seed}: {:#?}", found.findings));
+        assert!(cause.key == "sensor_play" && warns(&found, "sensor_play"), "{seed}: {}", cause.words);
+        let size = &cause.parameters[0];
+        assert!(size.unit == "m" && (size.value - 0.3e-3).abs() < 3.0 * size.error.max(2e-6), "{seed}: {size:?}");
+        for (one, truth) in cause.estimates.iter().zip(values) {
+            let one = one.as_ref().unwrap();
+            assert!((one.value / truth - 1.0).abs() < 3e-3, "{seed}: {} {} for {truth}", one.name, one.value);
+        }
+        assert_eq!(held(&found, values), 3, "{seed}: {:#?}", found.estimates);
+    }
+    let (case, values) = drawn(6, Truth::SensorPlay);
+    let mut plan = case.fit.clone().unwrap();
+    plan.nuisance.sensor_play = Some(Quantity::CartPosition);
+    let found = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();
+    let play = found.estimates.iter().find(|one| one.name == "sensor_play").unwrap();
+    assert!((play.value - 0.3e-3).abs() < 3e-6 && play.unit == "m", "{play:?}");
+    assert!(found.warnings().next().is_none() && found.cause.is_none(), "{:#?}", found.findings);
+    for (one, truth) in found.estimates.iter().zip(values) {
+        assert!((one.value / truth - 1.0).abs() < 3e-3, "{} {} for {truth}", one.name, one.value);
+    }
+}
+
 /// Turns that were late by up to a step of the simulated truth were told as friction that differs between the
 /// directions.
 #[test]

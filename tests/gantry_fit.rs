@@ -112,6 +112,30 @@ fn exchanged_columns_of_two_motors_are_named() {
     }
 }
 
+/// The reversed angle of one motor was told as a log that the model does not explain, without a reason.
+#[test]
+fn the_reversed_encoder_of_one_motor_is_named() {
+    for kind in [Kind::CoreXy, Kind::HFrame] {
+        for output in 0..2 {
+            let mut own = with_log(case(kind, &[]), &case(kind, &["cart.mass=0.5"]), None, 3);
+            let plan = Plan { free: vec!["cart.mass".into()], ..Plan::default() };
+            let is_told = |case: &Case| {
+                let found = check(case, &plan).unwrap();
+                found.fit.warnings().map(ToString::to_string).collect::<Vec<String>>()
+            };
+            assert!(is_told(&own).is_empty());
+            let log = Arc::make_mut(own.experiments[0].log.as_mut().unwrap());
+            log.outputs[output].values.iter_mut().for_each(|value| *value = -*value);
+            let name = log.outputs[output].quantity.name();
+            let told = is_told(&own);
+            let words = format!("with the sign of {name} reversed");
+            assert!(told.iter().any(|one| one.contains(&words)), "{kind:?} {name}: {told:#?}");
+            let other = "it moves opposite to the model";
+            assert!(!told.iter().any(|one| one.contains(other)), "{kind:?} {name}: {told:#?}");
+        }
+    }
+}
+
 /// Of drawn machines.
 #[derive(Default)]
 struct Coverage {

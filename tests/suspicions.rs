@@ -282,6 +282,84 @@ fn values_that_are_held_are_found() {
     }
 }
 
+/// The case of `drawn` with this noise, m, on its position, and after rest of this many rows; then its log is changed.
+fn noisy(seed: u64, deviation: f64, rest: usize, change: impl FnOnce(&mut Log)) -> Case {
+    changed(seed, |log| {
+        let mut chance = Chance::new(seed + 50);
+        let first = log.outputs[0].values[0];
+        for (column, before) in [(&mut log.inputs[0], 0.0), (&mut log.outputs[0].values, first)] {
+            column.splice(0..0, vec![before; rest]);
+            column.truncate(COUNT);
+        }
+        let raster = |value: f64| (value / 1e-6).round() * 1e-6;
+        log.outputs[0].values.iter_mut().for_each(|value| *value = raster(*value + deviation * chance.normal()));
+        change(log);
+    })
+}
+
+/// A reading that is stuck for 100 ms was found with little and with much noise, and missed between: the speeds beside
+/// it were taken from three samples. At rest it was not looked for.
+#[test]
+fn a_value_that_is_stuck_is_found_in_noise_of_any_size() {
+    for (seed, deviation) in [(611, 2e-5), (612, 4e-5), (613, 8e-5), (614, 1.6e-4), (615, 3.2e-4)] {
+        for at in [700, 1500, 2300] {
+            let stuck = noisy(seed, deviation, 0, |log| {
+                let values = &mut log.outputs[0].values;
+                let value = values[at];
+                values[at..at + 100].fill(value);
+            });
+            let found = fitted(&stuck);
+            let lines = format!("samples {} to {}", at + 2, at + 100);
+            let told = found.warnings().any(|one| one.code == "held" && one.text.contains(&lines));
+            assert!(told, "{seed}, {deviation}, {at}: {:?}", found.findings);
+        }
+        let resting = noisy(seed, deviation, 600, |log| {
+            let values = &mut log.outputs[0].values;
+            let value = values[300];
+            values[300..360].fill(value);
+        });
+        let found = fitted(&resting);
+        let told = found.warnings().any(|one| one.code == "frozen" && one.text.contains("samples 302 to 360"));
+        assert!(told, "{seed}, {deviation}: {:?}", found.findings);
+    }
+}
+
+/// Equal values of a good log are no stuck reading: at rest without noise, in counts, and with noise that grows with
+/// speed.
+#[test]
+fn equal_values_at_rest_are_no_stuck_reading() {
+    for seed in 621..=624 {
+        let logs: [(&str, &dyn Fn(&mut Log)); 5] = [
+            ("noise", &|_| ()),
+            ("counts", &|log| {
+                log.outputs[0].values.iter_mut().for_each(|value| *value = (*value / 5e-5).round() * 5e-5)
+            }),
+            ("counts as large as noise", &|log| {
+                log.outputs[0].values.iter_mut().for_each(|value| *value = (*value / 2e-5).round() * 2e-5);
+            }),
+            ("no noise at rest", &|log| {
+                let values = &mut log.outputs[0].values;
+                let value = values[0];
+                values[..590].fill(value);
+            }),
+            ("noise by speed", &|log| {
+                let mut chance = Chance::new(seed);
+                let values = &mut log.outputs[0].values;
+                let rest = values[0];
+                values[..605].fill(rest);
+                for k in 605..values.len() - 10 {
+                    values[k] += 2e-3 * (values[k + 10] - values[k]) * chance.normal();
+                }
+            }),
+        ];
+        for (name, change) in logs {
+            let found = fitted(&noisy(seed, if name == "noise by speed" { 0.0 } else { 2e-5 }, 600, change));
+            let told = found.findings.iter().any(|one| ["held", "frozen"].contains(&one.code));
+            assert!(!told, "{seed}, {name}: {:?}", found.findings);
+        }
+    }
+}
+
 /// An input that was logged 100 ms too early was fitted with a friction of zero and no word. Shifts beyond a delay are
 /// found in both directions, with their size; a shift of a few rows stays a delay.
 #[test]

@@ -344,6 +344,7 @@ fn fit() -> Value {
         ("input_offset", scope()),
         ("initial_state", flag()),
         ("bias", flag()),
+        ("sensor_play", words(Quantity::all().filter(|own| own.is_position()).map(Quantity::name))),
     ];
     table(
         "fit",

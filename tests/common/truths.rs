@@ -57,6 +57,8 @@ pub enum Truth {
     SpringAtMotor,
     /// Play of 0.3 mm, positions in counts of 50 µm.
     Play,
+    /// Play of 0.3 mm between the machine and the sensor alone.
+    SensorPlay,
     /// Samples taken 0 to 0.8 ms after their stamps.
     Late,
     /// Bristles.
@@ -72,11 +74,12 @@ pub enum Truth {
 }
 
 impl Truth {
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Right,
         Self::Spring,
         Self::SpringAtMotor,
         Self::Play,
+        Self::SensorPlay,
         Self::Late,
         Self::LuGre,
         Self::Drag,
@@ -92,6 +95,7 @@ impl Truth {
             Self::Spring => "a spring of 17 Hz between motor and cart",
             Self::SpringAtMotor => "the same, the position read at the motor",
             Self::Play => "play of 0.3 mm, counts of 50 µm",
+            Self::SensorPlay => "play of 0.3 mm between the machine and its sensor",
             Self::Late => "samples taken 0 to 0.8 ms after their stamps",
             Self::LuGre => "LuGre",
             Self::Drag => "a drag of 0.3 b v²",
@@ -192,8 +196,11 @@ pub fn drawn(seed: u64, truth: Truth) -> (Case, Values) {
     let values = [off(), 10.0 * off(), 1.5 * off()];
     let share = 0.3 + 0.3 * chance.uniform();
     let input = forces(&mut chance);
-    let position = positions(truth, values, &input, share);
+    let mut position = positions(truth, values, &input, share);
     let narrow = narrow(&mut chance);
+    if truth == Truth::SensorPlay {
+        behind_play(&mut position, 0.3e-3, chance.uniform());
+    }
     let count = if truth == Truth::Play { 50e-6 } else { 1e-6 };
     let read = |k: usize, chance: &mut Chance| {
         let late = if truth == Truth::Late { (0.8 * chance.uniform() * STEPS as f64) as usize } else { 0 };
@@ -208,6 +215,15 @@ pub fn drawn(seed: u64, truth: Truth) -> (Case, Values) {
     experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
     experiment.log = Some(columns("log", time, input, vec![output(Quantity::CartPosition, seen)]));
     (case, values)
+}
+
+/// Positions as a sensor reads them behind play of this width, of which this share lies ahead at first.
+fn behind_play(positions: &mut [f64], width: f64, ahead: f64) {
+    let mut read = positions[0];
+    for position in positions {
+        read = read.clamp(*position - ahead * width, *position + (1.0 - ahead) * width);
+        *position = read;
+    }
 }
 
 /// Noise of second order at 15 Hz, damped by 0.05, of deviation 1.

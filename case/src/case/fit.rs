@@ -4,6 +4,7 @@ use super::Experiment;
 use super::reader::{Field, Table, nearest};
 use super::tree::Kind;
 use crate::error::Result;
+use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::parameter::{self, Free, INPUT, Parameter, Range};
 
@@ -155,6 +156,8 @@ pub struct Nuisances {
     pub initial_state: bool,
     /// Something added to each output that is no position, and to positions where the start is not fitted.
     pub bias: bool,
+    /// The position whose sensor has play: its reading follows the motion only when the play is used up.
+    pub sensor_play: Option<Quantity>,
 }
 
 /// For which logs a number holds.
@@ -250,7 +253,7 @@ pub(super) fn plan(root: &Table, stage: &Machine, experiments: &[Experiment], wh
     }
     let huber =
         table.optional("loss").map_or(Ok(false), |field| field.choice(&[("squares", false), ("huber", true)]))?;
-    let nuisance = nuisances(&table)?;
+    let nuisance = nuisances(&table, stage, experiments, whole)?;
     let closed_loop =
         table.optional("loop").map_or(Ok(false), |field| field.choice(&[("logged", false), ("closed", true)]))?;
     if let (true, Some(field)) = (closed_loop, table.optional("loop")) {
@@ -336,6 +339,13 @@ fn closed(
         return Err(field
             .fail("a controller begins with the log, not in the middle of it")
             .next("leave out `windows` or `loop`"));
+    }
+    if nuisance.sensor_play.is_some() {
+        return Err(field
+            .fail(
+                "the controller of a loop that is closed again receives exact positions, without the play of a sensor",
+            )
+            .next("leave `sensor_play` out of `nuisance`, or leave out `loop`"));
     }
     if nuisance.delay != Scope::Off || nuisance.input_offset != Scope::Off {
         return Err(field
@@ -515,10 +525,11 @@ pub(super) fn prior_of(kind: &str, field: &Field, key: &str) -> Result<Prior> {
     }
 }
 
-fn nuisances(table: &Table) -> Result<Nuisances> {
+/// The numbers that are fitted along.
+fn nuisances(table: &Table, machine: &Machine, experiments: &[Experiment], whole: bool) -> Result<Nuisances> {
     let Some(field) = table.optional("nuisance") else { return Ok(Nuisances::default()) };
     let table = field.table()?;
-    table.check_keys(&["delay", "input_gain", "input_offset", "initial_state", "bias"], &[])?;
+    table.check_keys(&["delay", "input_gain", "input_offset", "initial_state", "bias", "sensor_play"], &[])?;
     let flag = |key: &str| match table.optional(key) {
         None => Ok(false),
         Some(field) => match &field.node.kind {
@@ -537,13 +548,32 @@ fn nuisances(table: &Table) -> Result<Nuisances> {
                 .next("true gives each log its own, \"shared\" all of them the same")),
         },
     };
+    let logs = whole.then_some(experiments);
     Ok(Nuisances {
         delay: scope("delay")?,
         input_gain: scope("input_gain")?,
         input_offset: scope("input_offset")?,
         initial_state: flag("initial_state")?,
         bias: flag("bias")?,
+        sensor_play: table.optional("sensor_play").map_or(Ok(None), |field| logged_position(&field, machine, logs))?,
     })
+}
+
+/// The position of a machine that a field names; one that a log has, if the logs of these experiments were read.
+fn logged_position(field: &Field, machine: &Machine, logs: Option<&[Experiment]>) -> Result<Option<Quantity>> {
+    let positions = machine.quantities().iter().filter(|quantity| quantity.is_position());
+    let choices: Vec<(&str, Quantity)> = positions.map(|quantity| (quantity.name(), *quantity)).collect();
+    let quantity = field.choice(&choices)?;
+    let has = |experiment: &Experiment| {
+        experiment.log.iter().flat_map(|log| &log.outputs).any(|output| output.quantity == quantity)
+    };
+    let logged: Vec<&Experiment> = logs.into_iter().flatten().filter(|experiment| experiment.log.is_some()).collect();
+    match logged.is_empty() || logged.into_iter().any(has) {
+        true => Ok(Some(quantity)),
+        false => Err(field
+            .fail(format!("no log has an output `{}`", quantity.name()))
+            .next("name the position whose sensor has play as the logs have it")),
+    }
 }
 
 #[cfg(test)]

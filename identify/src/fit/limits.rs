@@ -1070,7 +1070,7 @@ pub(crate) const CAUSE_STEPS: usize = 4;
 /// Starts that are fitted whole: the best of each element, then others.
 ///
 /// Unit: starts. Source: chosen: all elements and three more. Test: `play_is_named_where_first_steps_suggest_a_spring`.
-pub(crate) const CAUSES_FITTED: usize = 15;
+pub(crate) const CAUSES_FITTED: usize = 16;
 
 /// Starts of one element that are fitted whole.
 ///
@@ -1149,6 +1149,17 @@ pub(crate) const FLANK_FREQUENCY: f64 = 150.0;
 ///
 /// Unit: 1. Source: chosen.
 pub(crate) const FLANK_DAMPING: f64 = 0.5;
+
+/// Widths of the play of a sensor that are tried.
+///
+/// Unit: standard deviations of the residuals. Source: chosen: a fit without play leaves a third to half of the width.
+/// Test: `play_of_a_sensor_is_named_with_its_width`.
+pub(crate) const CAUSE_WIDTHS: [f64; 3] = [1.5, 3.0, 6.0];
+
+/// Standard deviation of the share of the play of a sensor that lies ahead where a log begins.
+///
+/// Unit: 1. Source: uniform distribution, 1/√12. Test: `play_of_a_sensor_is_named_with_its_width`.
+pub(crate) const SENSOR_START: f64 = 0.2887;
 
 /// Delays that are tried.
 ///

@@ -25,6 +25,19 @@ const FOLD_SHARP: f64 = 1.7;
 /// The mean speed over a held value is within this factor of the speeds before and behind it.
 const CAUGHT_UP: f64 = 2.0;
 
+/// Number of values that decide, on either side of a repeated value, whether noise would change it.
+const NEAR: [usize; 2] = [20, 200];
+
+/// The noise of a value that is repeated is at least this many times the resolution of its column.
+const DITHERS: f64 = 3.0;
+
+/// Correlation of neighbouring second differences below which they are noise and not the curve of a motion; that of
+/// white noise is −2/3, of a random walk −1/2.
+const ALTERNATE: f64 = -0.3;
+
+/// Expected number of runs of equal values, as long as one that is reported, in a log with this noise.
+const BY_CHANCE: f64 = 1e-6;
+
 /// Steps differ by at least this share of the largest value, or by rounding alone.
 const ROUNDING: f64 = 1e-6;
 
@@ -69,8 +82,10 @@ pub struct Channel {
     pub wraps: usize,
     /// Jumps of a position by any other amount.
     pub jumps: Vec<Jump>,
-    /// Runs of a position that keep one value although the motion goes on.
+    /// Runs of a position that keep one value although the motion goes on, or although noise would change it.
     pub held: Vec<Held>,
+    /// Runs of a position at rest that keep one value although noise would change it.
+    pub frozen: Vec<Held>,
     /// Times at which a position or speed that is nowhere negative turns at zero without slowing down, s.
     pub folds: Vec<f64>,
     /// How many different values there are, counted up to 1000.
@@ -101,7 +116,8 @@ pub struct Jump {
     pub size: f64,
 }
 
-/// A value that is repeated although the motion goes on: the next value has caught up with it.
+/// A value that is repeated although the motion goes on, and the next value has caught up with it; or although noise
+/// would change it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Held {
     /// The first repeated sample, from 0.
@@ -112,6 +128,16 @@ pub struct Held {
     pub samples: usize,
     /// From the value to the next one.
     pub travel: f64,
+}
+
+impl Held {
+    /// Its samples by their numbers in the log, from 1.
+    fn words(&self) -> String {
+        match self.samples {
+            1 => format!("sample {}", self.sample + 1),
+            n => format!("samples {} to {}", self.sample + 1, self.sample + n),
+        }
+    }
 }
 
 /// A run of equal values at an extreme.
@@ -149,12 +175,14 @@ impl Channel {
             wraps: 0,
             jumps: Vec::new(),
             held: Vec::new(),
+            frozen: Vec::new(),
             folds: Vec::new(),
             levels: sorted.len().min(1000),
         };
         channel.wraps = channel.count_wraps(values);
         if channel.wraps == 0 {
             channel.held = channel.find_held(values, time);
+            channel.find_frozen(values, time);
             channel.jumps = channel.find_jumps(values, time);
         }
         channel.folds = channel.find_folds(values, time);
@@ -256,6 +284,49 @@ impl Channel {
             first = next;
         }
         held
+    }
+
+    /// Runs of equal values of a position that noise would change: of those around them it does, and they are too many
+    /// for chance. Noise may grow with speed, so that a run in motion is a suspicion only.
+    fn find_frozen(&mut self, values: &[f64], time: &[f64]) {
+        if !self.is_position() {
+            return;
+        }
+        let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+        sorted.sort_by(f64::total_cmp);
+        // Steps of a converter or of a printed number are no larger than the least difference of two values.
+        let rounding = f64::EPSILON * self.least.abs().max(self.greatest.abs());
+        let gaps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 4.0 * rounding);
+        let resolution = gaps.fold(f64::INFINITY, f64::min).max(self.step.unwrap_or_default());
+        let mut first = 0;
+        for run in values.chunk_by(|a, b| a == b) {
+            let (n, next) = (run.len(), first + run.len());
+            let near = n.clamp(NEAR[0], NEAR[1]);
+            let sides = [&values[first.saturating_sub(near)..first], &values[next..(next + near).min(values.len())]];
+            let sides: Vec<Side> = sides.into_iter().filter(|side| side.len() >= NEAR[0]).map(Side::of).collect();
+            let sigma = sides.iter().map(|side| side.noise).fold(f64::INFINITY, f64::min);
+            let is_known = self.held.iter().any(|held| held.sample == first + 1);
+            if n > 1
+                && !is_known
+                && !sides.is_empty()
+                && sigma > DITHERS * resolution
+                && sides.iter().all(Side::alternates)
+            {
+                // Two values of normal noise are rounded to one step: Δ/(2 √π σ).
+                let alike = resolution / (2.0 * std::f64::consts::PI.sqrt() * sigma);
+                let alike = sides.iter().map(|side| side.repeats).fold(alike, f64::max);
+                if values.len() as f64 * alike.powf(n as f64 - 1.0) < BY_CHANCE {
+                    let travel = if next < values.len() { values[next] - values[first] } else { 0.0 };
+                    let held = Held { sample: first + 1, time: time[first + 1], samples: n - 1, travel };
+                    let is_near = |side: &Side| side.is_at_rest() && (side.mean - run[0]).abs() < BESIDE as f64 * sigma;
+                    match sides.iter().all(is_near) {
+                        true => self.frozen.push(held),
+                        false => self.held.push(held),
+                    }
+                }
+            }
+            first = next;
+        }
     }
 
     /// Steps of a position that differ from the steps on both sides by far more than these do among each other, and do
@@ -471,12 +542,25 @@ impl Channel {
             let (travel, at) = (value(longest.travel.abs()), seconds(longest.time));
             let many = if n == 1 { "one sample repeats".to_string() } else { format!("{n} samples repeat") };
             let text = format!(
-                "{many} the value before although it moves on, at most {} in a row, from {at} on, while it moves by \
-                 {travel}: a sensor or recorder that holds its last value; leave these cells empty",
-                longest.samples
+                "{many} the value before although it moves on, at most {} in a row ({}), from {at} on, while it moves \
+                 by {travel}: a sensor or recorder that holds its last value; leave these cells empty",
+                longest.samples,
+                longest.words()
             );
             let is_bad = longest.samples >= CLIPPED || n as f64 > HELD_MANY * samples;
             note("held", if is_bad { Severity::Suspicion } else { Severity::Warning }, text);
+        }
+        if let Some(longest) = self.frozen.iter().max_by_key(|held| held.samples) {
+            let text = format!(
+                "{} samples repeat the value before exactly ({}, from {} on), although its noise of \
+                 {} changes it from one sample to the next everywhere else: a sensor or recorder that holds its last \
+                 value; leave these cells empty",
+                longest.samples,
+                longest.words(),
+                seconds(longest.time),
+                value(self.noise),
+            );
+            note("frozen", Severity::Suspicion, text);
         }
         if !self.jumps.is_empty() {
             note("jumps", Severity::Suspicion, jumps_text(&self.jumps, self.unit));
@@ -553,6 +637,44 @@ impl Channel {
             ("rad", _) => Some(std::f64::consts::TAU),
             (_, step) => step.map(|step| 65536.0 * step),
         }
+    }
+}
+
+/// The values beside a run of equal ones.
+struct Side {
+    /// Standard deviation of their noise.
+    noise: f64,
+    mean: f64,
+    /// Difference of the means of their halves.
+    drift: f64,
+    /// Correlation of neighbouring second differences.
+    memory: f64,
+    /// Share of values that repeat the one before, as of a few more of them.
+    repeats: f64,
+}
+
+impl Side {
+    fn of(values: &[f64]) -> Self {
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        let (early, late) = values.split_at(values.len() / 2);
+        let bends: Vec<f64> = values.windows(3).map(|y| y[0] - 2.0 * y[1] + y[2]).collect();
+        let square: f64 = bends.iter().map(|bend| bend * bend).sum();
+        let equal = values.windows(2).filter(|pair| pair[0] == pair[1]).count();
+        Self {
+            noise: noise(values),
+            mean: mean(values),
+            drift: mean(late) - mean(early),
+            memory: bends.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / square,
+            repeats: (equal as f64 + 1.0) / (values.len() as f64 + 1.0),
+        }
+    }
+
+    fn alternates(&self) -> bool {
+        self.memory < ALTERNATE
+    }
+
+    fn is_at_rest(&self) -> bool {
+        self.drift.abs() < self.noise
     }
 }
 

@@ -8,4 +8,5 @@ mod reading;
 pub(crate) mod residuals;
 pub(crate) mod run;
 mod sensitivity;
+mod sensor_play;
 pub(crate) mod straight;

@@ -6,7 +6,7 @@ use super::run::{Extra, MeasuredOutput, Nuisance, Run, Setting, rounding_at_rest
 use super::straight::straightened;
 use crate::case::{Case, Nuisances, Plan, Scope, matches, parameters};
 use crate::error::{Error, Result};
-use crate::fit::limits::{FILE_ROUNDING, KNOWN_DELAY, SLOW_BY_DIFFERENCE, STARTS_MOVING};
+use crate::fit::limits::{FILE_ROUNDING, KNOWN_DELAY, SENSOR_START, SLOW_BY_DIFFERENCE, STARTS_MOVING};
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, DriveUnit, Machine};
 use crate::parameter::{self, Free};
@@ -178,7 +178,7 @@ impl<'a> Problem<'a> {
     }
 
     fn add_extras(&mut self, case: &Case, plan: &Plan) {
-        let &Nuisances { delay, input_gain, input_offset, initial_state, bias } = &plan.nuisance;
+        let &Nuisances { delay, input_gain, input_offset, initial_state, bias, sensor_play } = &plan.nuisance;
         let interval = self.runs[0].interval();
         // Samples that are taken after their stamps appear as an early input, if the input is logged.
         let mut inputs = self.runs.iter().flat_map(Run::inputs);
@@ -195,6 +195,12 @@ impl<'a> Problem<'a> {
             let what = Nuisance::InputOffset(drive);
             scopes.push((input_offset, Extra { what, start: 0.0, unit: most, low: -most, high: most, known: None }));
         }
+        if let Some(quantity) = sensor_play {
+            let seen = self.runs.iter().flat_map(|run| &run.seen).filter(|seen| seen.quantity == quantity);
+            let wide = seen.map(|seen| extent(&seen.values)).fold(1e-9, f64::max);
+            let (what, unit) = (Nuisance::SensorPlay(quantity), 1e-2 * wide);
+            scopes.push((Scope::Shared, Extra { what, start: 0.0, unit, low: 0.0, high: wide, known: None }));
+        }
         self.shared = scopes.iter().filter(|(scope, _)| *scope == Scope::Shared).map(|(_, extra)| *extra).collect();
         let noise = self.noise();
         for run in self.runs.iter_mut().chain(&mut self.held_out) {
@@ -208,6 +214,12 @@ impl<'a> Problem<'a> {
                 let start = Start { slide, reading: reading.as_ref(), noise: &noise };
                 let extras = start.extras(run, machine, (initial_state, given));
                 run.extras.extend(extras);
+            }
+            if let Some(quantity) = sensor_play.filter(|own| run.seen.iter().any(|seen| seen.quantity == *own)) {
+                let start = ahead(run, quantity, &noise, initial_state);
+                let known = Some(SENSOR_START);
+                let what = Nuisance::SensorStart(quantity);
+                run.extras.push(Extra { what, start, unit: 1.0, low: 0.0, high: 1.0, known });
             }
             for (index, seen) in run.seen.iter().enumerate() {
                 let counted = readings.iter().flatten().any(|reading| reading.takes(index));
@@ -714,6 +726,17 @@ pub(crate) fn extent(values: &[f64]) -> f64 {
     let finite = values.iter().filter(|v| v.is_finite());
     let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)));
     if high >= low { high - low } else { 0.0 }
+}
+
+/// The share of the play of a sensor that lies ahead where a run begins: none if it begins in forward motion, all of it
+/// in backward motion.
+fn ahead(run: &Run, quantity: Quantity, noise: &Noise, initial_state: bool) -> f64 {
+    let (slope, doubt) = Reading::of_output(run, quantity).speed_at_start(run, |own| Some(noise.of(own)));
+    match initial_state || run.window > 0 {
+        true if slope > STARTS_MOVING * doubt => 0.0,
+        true if slope < -STARTS_MOVING * doubt => 1.0,
+        _ => 0.5,
+    }
 }
 
 /// The variables of the start of a slide in a run.

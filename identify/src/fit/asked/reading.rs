@@ -41,6 +41,12 @@ impl Reading {
         parts.map(|parts| Self { parts })
     }
 
+    /// The output of this quantity by itself, in its unit.
+    pub fn of_output(run: &Run, quantity: Quantity) -> Self {
+        let output = run.seen.iter().position(|seen| seen.quantity == quantity);
+        Self { parts: output.map(|output| (output, 1.0)).into_iter().collect() }
+    }
+
     /// True if an output is a part of it.
     pub fn takes(&self, output: usize) -> bool {
         self.parts.iter().any(|(own, _)| *own == output)

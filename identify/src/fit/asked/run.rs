@@ -29,6 +29,10 @@ pub enum Nuisance {
     StartSpeed(usize),
     /// Added to an output.
     Bias(usize),
+    /// Width of the play between the machine and the sensor of this quantity, in its unit.
+    SensorPlay(Quantity),
+    /// Share of that play that lies ahead at the start.
+    SensorStart(Quantity),
 }
 
 impl Nuisance {
@@ -47,6 +51,8 @@ impl Nuisance {
             Nuisance::StartPosition(slide) => of_slide(slide, "start_position"),
             Nuisance::StartSpeed(slide) => of_slide(slide, "start_speed"),
             Nuisance::Bias(_) => "bias".into(),
+            Nuisance::SensorPlay(_) => "sensor_play".into(),
+            Nuisance::SensorStart(_) => "sensor_start".into(),
         }
     }
 
@@ -57,13 +63,19 @@ impl Nuisance {
             Nuisance::InputOffset(drive) => machine.drives[drive].amplifier.mode.unit(),
             Nuisance::StartPosition(_) => "m",
             Nuisance::StartSpeed(_) => "m/s",
-            Nuisance::InputGain(_) | Nuisance::Bias(_) => "",
+            Nuisance::SensorPlay(quantity) => quantity.unit(),
+            Nuisance::InputGain(_) | Nuisance::Bias(_) | Nuisance::SensorStart(_) => "",
         }
     }
 
     /// True if it is where a run begins, or how fast.
     pub(crate) fn is_start(self) -> bool {
-        matches!(self, Nuisance::StartPosition(_) | Nuisance::StartSpeed(_))
+        matches!(self, Nuisance::StartPosition(_) | Nuisance::StartSpeed(_) | Nuisance::SensorStart(_))
+    }
+
+    /// True if it is of the play of a sensor, which changes readings and not the motion.
+    pub(crate) fn is_of_sensor(self) -> bool {
+        matches!(self, Nuisance::SensorPlay(_) | Nuisance::SensorStart(_))
     }
 }
 
@@ -310,7 +322,12 @@ impl Run {
         match extra.what {
             Nuisance::Bias(_) => true,
             Nuisance::StartPosition(_) => self.seen.iter().all(|seen| !seen.absolute) && !is_placed,
-            Nuisance::Delay | Nuisance::InputGain(_) | Nuisance::InputOffset(_) | Nuisance::StartSpeed(_) => false,
+            Nuisance::Delay
+            | Nuisance::InputGain(_)
+            | Nuisance::InputOffset(_)
+            | Nuisance::StartSpeed(_)
+            | Nuisance::SensorPlay(_)
+            | Nuisance::SensorStart(_) => false,
         }
     }
 
@@ -412,8 +429,8 @@ impl Run {
         input
     }
 
-    /// The model's outputs at the log's times, one column for each, biases not yet added; false where it does not
-    /// reach the end.
+    /// The model's outputs at the log's times, one column for each, before what sensors make of them; false where it
+    /// does not reach the end.
     pub fn predict(
         &self,
         bench: &mut Bench,
@@ -486,11 +503,9 @@ impl Run {
             *out = own;
         }
         for (i, (seen, column)) in self.seen.iter().zip(columns).enumerate() {
-            let bias = self.bias(i, extras);
-            let out = &mut out[i * n..(i + 1) * n];
-            for k in 0..n {
-                let value = if seen.absolute { column[k].abs() } else { column[k] } + bias;
-                out[k] = if seen.weights[k] == 0.0 { 0.0 } else { seen.weights[k] * (value - seen.values[k]) };
+            let read = self.read(i, column, extras);
+            for (k, out) in out[i * n..(i + 1) * n].iter_mut().enumerate() {
+                *out = if seen.weights[k] == 0.0 { 0.0 } else { seen.weights[k] * (read[k] - seen.values[k]) };
             }
         }
         true

@@ -2,7 +2,7 @@
 
 use super::problem::Problem;
 use super::residuals::{Bounds, Differences, Step};
-use super::run::{Nuisance, Run, between, heading_of, per_position};
+use super::run::{Extra, Nuisance, Run, between, heading_of, per_position};
 use crate::fit::limits::{EQUATION_STEP, START_STEP};
 use crate::log::Quantity;
 use crate::machine::Machine;
@@ -26,8 +26,11 @@ impl Problem<'_> {
         if self.runs[index].is_closed() || !machine.is_piecewise_linear() {
             return false;
         }
+        // What changes the readings alone needs no run.
+        let is_of_sensor = |j: &&usize| self.extra_of((index, **j)).is_some_and(|extra| extra.what.is_of_sensor());
+        let (of_sensor, movers): (Vec<usize>, Vec<usize>) = columns.iter().partition(is_of_sensor);
         let variables = |is_moved: bool| {
-            let all = columns.iter().map(|&j| self.variable_of((index, j), x, bounds, is_moved));
+            let all = movers.iter().map(|&j| self.variable_of((index, j), x, bounds, is_moved));
             all.collect::<Option<Vec<_>>>()
         };
         // If the start of the cart does not matter, it is the origin, so that all runs share the prepared matrices; but
@@ -43,7 +46,7 @@ impl Problem<'_> {
         }
         let variables = all;
         let extras = self.extras_from(index, x, is_moved);
-        let Some(slopes) = self.runs[index].slopes(bench, machine, &extras, &variables) else { return false };
+        let Some(mut slopes) = self.runs[index].slopes(bench, machine, &extras, &variables) else { return false };
         self.simulations += 1;
         let run = &self.runs[index];
         let rows = run.time.len();
@@ -62,6 +65,19 @@ impl Problem<'_> {
             if !run.compare(&shown, &own, residuals) {
                 return false;
             }
+        }
+        let own = self.extras_of(index, x);
+        let columns: Vec<usize> = movers.into_iter().chain(of_sensor).collect();
+        for (i, (values, slopes)) in slopes.iter_mut().enumerate() {
+            slopes.resize(columns.len(), vec![0.0; rows]);
+            let Some(play) = run.sensor_play(i, &own) else { continue };
+            let by = |j: &usize| match self.extra_of((index, *j)) {
+                Some(Extra { what: Nuisance::SensorPlay(of), unit, .. }) if of == run.seen[i].quantity => [unit, 0.0],
+                Some(Extra { what: Nuisance::SensorStart(of), unit, .. }) if of == run.seen[i].quantity => [0.0, unit],
+                _ => [0.0; 2],
+            };
+            play.differentiate(values, slopes.iter_mut().zip(columns.iter().map(by)));
+            *values = play.read(values);
         }
         for (i, (seen, (values, slopes))) in run.seen.iter().zip(&slopes).enumerate() {
             for (&j, slopes) in columns.iter().zip(slopes) {
@@ -97,14 +113,18 @@ impl Problem<'_> {
         extras
     }
 
+    /// The nuisance that variable `j` of the search is for run `index`; `None` for a parameter of a machine.
+    fn extra_of(&self, (index, j): (usize, usize)) -> Option<Extra> {
+        match j.checked_sub(self.parameters.len())? {
+            shared if j < self.globals() => Some(self.shared[shared]),
+            _ => self.own_variables(index).into_iter().find(|(own, _)| *own == j).map(|(_, extra)| extra),
+        }
+    }
+
     /// The meaning of variable `j` of the search for run `index`; `None` if it is neither a parameter of a machine nor
     /// a known change of the input.
     fn variable_of(&self, (index, j): (usize, usize), x: &[f64], bounds: &Bounds, is_moved: bool) -> Option<Variable> {
-        let extra = match j.checked_sub(self.parameters.len()) {
-            None => None,
-            Some(shared) if j < self.globals() => Some(self.shared[shared]),
-            Some(_) => self.own_variables(index).into_iter().find(|(own, _)| *own == j).map(|(_, extra)| extra),
-        };
+        let extra = self.extra_of((index, j));
         let run = &self.runs[index];
         let begun = |to: f64| {
             let mut moved = x.to_vec();
@@ -117,7 +137,7 @@ impl Problem<'_> {
                 let from = run.begins(drive, &self.extras_of(index, x))?;
                 Some(Variable::Offset { drive, unit, from })
             }
-            Some((Nuisance::Bias(_), _)) => None,
+            Some((Nuisance::Bias(_) | Nuisance::SensorPlay(_) | Nuisance::SensorStart(_), _)) => None,
             Some((Nuisance::StartPosition(_) | Nuisance::StartSpeed(_), _)) => {
                 Some(Variable::central(START_STEP, |by| begun(x[j] + by)))
             }

@@ -40,7 +40,8 @@ pub struct OtherLaw {
 /// An element that the model lacks and the logs show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
-    /// Its key: `spring`, `play`, `delay`, `limit`, `inductance`, `drag`, `stribeck`, `lugre`, `load`, `apart`.
+    /// Its key: `spring`, `play`, `sensor_play`, `delay`, `limit`, `inductance`, `drag`, `stribeck`, `lugre`, `load`,
+    /// `apart`.
     pub key: &'static str,
     /// In words, with its size.
     pub words: String,

@@ -30,9 +30,11 @@ pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, su
     all.extend(interruptions(case, plan, found).into_iter().filter(|_| !is_explained));
     all.extend(of_motor(case, fit));
     let unexplained = of_residuals(case, plan, found, fit, &all);
-    // Each of two exchanged columns may move against the model, but a change of sign corrects neither.
-    let is_swapped = |log: &Option<String>| unexplained.iter().any(|one| one.code == "swapped" && one.log == *log);
-    all.retain(|one| !(one.code == "sign" && is_swapped(&one.log)));
+    // Each of two exchanged columns may move against the model, but a change of sign corrects neither; and where one
+    // column is reversed, not all are.
+    let is_corrected =
+        |log: &Option<String>| unexplained.iter().any(|one| ["swapped", "sign"].contains(&one.code) && one.log == *log);
+    all.retain(|one| !(one.code == "sign" && is_corrected(&one.log)));
     all.extend(unexplained);
     let astray = astray(surveys, &all);
     let follows = ["time-unit", "interruption", "unexplained"];
@@ -319,10 +321,11 @@ fn of_residuals(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, others: &
         }
         let is_reversed =
             |name: &&str| others.iter().any(|one| one.code == "sign" && one.log.as_deref() == Some(*name));
-        // Where the sign is the reason, no other is looked for, but that two columns have changed places.
+        // Where the sign is the reason, no other is looked for, but that two columns have changed places or one has the
+        // wrong sign.
         let reason = match names.iter().all(is_reversed) {
-            true => match unexplained::exchange(case, plan, found, quantity, &names) {
-                Some(exchanged) => Some(exchanged),
+            true => match unexplained::of_columns(case, plan, found, quantity, &names) {
+                Some(corrected) => Some(corrected),
                 None => continue,
             },
             false => unexplained::reason(case, plan, found, quantity, &names),
@@ -330,7 +333,7 @@ fn of_residuals(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, others: &
         let Reason { code, text } = reason.unwrap_or_else(|| Reason {
             code: "unexplained",
             text:
-                "neither windows nor exchanged columns nor a factor on it or on the input explains that: check signs, \
+                "neither windows nor exchanged or reversed columns nor a factor on it or on the input explains that: check signs, \
                    columns and units of this log, and missing parts of the model"
                     .into(),
         });

@@ -276,9 +276,8 @@ fn answer(problem: &Problem, idea: &Idea, measured: &[(Quantity, f64)], index: u
     let mut values = Vec::new();
     for (column, (quantity, sigma)) in columns.iter().zip(measured) {
         let output = run.seen.iter().position(|seen| seen.quantity == *quantity);
-        let bias = output.map_or(0.0, |output| run.bias(output, &extras));
-        let absolute = output.is_some_and(|output| run.seen[output].absolute);
-        values.extend(column.iter().map(|v| (if absolute { v.abs() } else { *v } + bias) / sigma));
+        let read = output.map_or_else(|| column.clone(), |output| run.read(output, column, &extras));
+        values.extend(read.iter().map(|value| value / sigma));
     }
     Some(values)
 }

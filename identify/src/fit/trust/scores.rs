@@ -85,9 +85,7 @@ pub(crate) fn compared(
         .zip(columns)
         .enumerate()
         .map(|(i, (seen, column))| {
-            let bias = run.bias(i, extras);
-            let mut model: Vec<f64> =
-                column.iter().map(|v| if seen.absolute { v.abs() + bias } else { v + bias }).collect();
+            let mut model = run.read(i, &column, extras);
             model.resize(n, f64::NAN);
             OutputFit {
                 quantity: seen.quantity,

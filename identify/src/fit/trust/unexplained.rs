@@ -1,4 +1,5 @@
-//! Reasons why a model explains little of an output: windows, exchanged columns and factors, each tried by a fit.
+//! Reasons why a model explains little of an output: windows, exchanged or reversed columns and factors, each tried by
+//! a fit.
 
 use super::trials::{Mended, mended};
 use crate::case::{Case, Plan};
@@ -24,13 +25,13 @@ pub(super) struct Reason {
 }
 
 /// The reason why the model explains little of an output in the logs of these names; `None` if neither windows nor
-/// exchanged columns nor a factor correct it.
+/// exchanged or reversed columns nor a factor correct it.
 pub(super) fn reason(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names: &[&str]) -> Option<Reason> {
     if found.problem.is_stopped() {
         return None;
     }
     let told = |code| move |text| Reason { code, text };
-    exchange(case, plan, found, quantity, names)
+    of_columns(case, plan, found, quantity, names)
         .or_else(|| windows(case, plan, found, quantity).map(told("unexplained")))
         .or_else(|| factor(case, plan, found, quantity, names).map(told("unexplained")))
 }
@@ -104,8 +105,8 @@ fn explained(problem: &Problem, residuals: &[f64], quantity: Quantity) -> f64 {
     1.0 - (ours / lines.max(f64::MIN_POSITIVE)).sqrt()
 }
 
-/// Another output of the same kind with which it was exchanged: the two motors of a gantry.
-pub(super) fn exchange(
+/// Columns that have changed places, or one with the wrong sign.
+pub(super) fn of_columns(
     case: &Case,
     plan: &Plan,
     found: &Searched,
@@ -119,7 +120,43 @@ pub(super) fn exchange(
             && other.is_linear() == quantity.is_linear()
     };
     let others: Vec<Quantity> = found.problem.quantities().into_iter().filter(is_alike).collect();
-    others.into_iter().find_map(|other| {
+    exchange(case, plan, found, (quantity, &others), names)
+        .or_else(|| reversal(case, plan, found, (quantity, &others), names))
+}
+
+/// The output of several of one kind whose sign is wrong: the encoder of one motor of a gantry. That of the only output
+/// is the sign of the input.
+fn reversal(
+    case: &Case,
+    plan: &Plan,
+    found: &Searched,
+    (quantity, others): (Quantity, &[Quantity]),
+    names: &[&str],
+) -> Option<Reason> {
+    let any = std::iter::once(quantity).chain(others.iter().copied()).filter(|_| !others.is_empty());
+    any.into_iter().find_map(|own| {
+        let left = mended(case, plan, found, names, &Remedy::Flip(own), TRIAL_FIT_ITERATIONS)?.left;
+        let name = own.name();
+        (left <= FACTOR_LEAVES).then(|| Reason {
+            code: "sign",
+            text: format!(
+                "with the sign of {name} reversed {:.1} % of the squared residuals are left: swapped wires of its \
+                 encoder, or a sign; set scale = {{ {name} = -1 }}",
+                100.0 * left
+            ),
+        })
+    })
+}
+
+/// Another output of the same kind with which it was exchanged: the two motors of a gantry.
+fn exchange(
+    case: &Case,
+    plan: &Plan,
+    found: &Searched,
+    (quantity, others): (Quantity, &[Quantity]),
+    names: &[&str],
+) -> Option<Reason> {
+    others.iter().copied().find_map(|other| {
         let remedy = Remedy::Exchange(quantity, other);
         let left = mended(case, plan, found, names, &remedy, TRIAL_FIT_ITERATIONS)?.left;
         (left <= FACTOR_LEAVES).then(|| Reason {

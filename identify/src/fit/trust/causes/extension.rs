@@ -2,6 +2,7 @@
 
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
+use crate::fit::asked::run::Nuisance;
 use crate::fit::search::starts::Searched;
 use crate::fit::trust::doubts::Size;
 use crate::friction::Friction;
@@ -53,8 +54,8 @@ pub(super) struct Extended {
 pub(super) enum Telling {
     /// The parameter of this name, which is zero, or stiff, without the element.
     Parameter(String),
-    /// The last nuisance parameter that all logs share, and the start of its search, SI.
-    Nuisance(f64),
+    /// A nuisance parameter that all logs share, and the start of its search, SI.
+    Nuisance(Nuisance, f64),
     /// The parameters of these names, which are equal without the element.
     Apart(Vec<String>),
 }

@@ -18,6 +18,7 @@ mod bristles;
 mod extension;
 mod force;
 mod gear;
+mod sensor;
 mod stamp;
 mod tried;
 
@@ -40,6 +41,7 @@ use tried::Tried;
 const EXTENSIONS: &[Extension] = &[
     row("spring", gear::springs, gear::spring_words, gear::without),
     row("play", gear::plays, gear::play_words, gear::without),
+    row("sensor_play", sensor::plays, sensor::words, as_it_is),
     row("delay", stamp::delays, stamp::words, as_it_is),
     row("limit", amplifier::limits, amplifier::limit_words, amplifier::without_limit),
     row("inductance", amplifier::inductances, amplifier::inductance_words, amplifier::without_inductance),

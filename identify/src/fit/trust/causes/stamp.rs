@@ -4,6 +4,7 @@ use super::extension::{Extended, Fitted, Said, Site, Telling, shown};
 use crate::case::{Plan, Scope};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
+use crate::fit::asked::run::Nuisance;
 use crate::fit::limits::{CAUSE_DELAYS, CAUSE_ERRORS};
 use crate::fit::search::regression::suspected_delay;
 
@@ -17,7 +18,9 @@ pub(super) fn delays(site: &Site) -> Vec<Extended> {
     let interval = site.found.problem.runs[0].interval();
     let suspected = suspected_delay(&site.found.problem);
     let starts = CAUSE_DELAYS.iter().map(|share| share * interval).chain(suspected);
-    let of = |delay: f64| Extended::new(site.with(site.machine.clone()), plan.clone(), Telling::Nuisance(delay));
+    let of = |delay: f64| {
+        Extended::new(site.with(site.machine.clone()), plan.clone(), Telling::Nuisance(Nuisance::Delay, delay))
+    };
     starts.map(of).collect()
 }
 

@@ -5,6 +5,7 @@ use super::{stamp, widened};
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
+use crate::fit::asked::run::{Extra, Nuisance};
 use crate::fit::limits::{
     CAUSE_DIFFERENCE, CAUSE_EXPLAINS, CAUSE_REACH, CAUSE_SLOW, CAUSE_SLOW_STEPS, CAUSE_STEPS, COLOURED,
     ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS,
@@ -36,8 +37,7 @@ impl<'a> Tried<'a> {
     /// the logs. Steps of curved friction, which take long, are not taken where the linear model at the start shows
     /// that they will not fall below `goal`.
     pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, goal: f64) -> Option<Self> {
-        let own = &site.found.best.x[site.found.problem.globals()..];
-        let mut begun = Self::from(site, row, extended, own)?;
+        let mut begun = Self::from(site, row, extended, (&site.found.problem, &site.found.best.x))?;
         let before = site.found.best.cost;
         let gain = before - (begun.cost() - begun.best.promise());
         if row.is_curved && before - CAUSE_REACH * gain > goal {
@@ -47,19 +47,30 @@ impl<'a> Tried<'a> {
         Some(begun)
     }
 
-    /// The start of a fit of the machine of a case with the element, and these variables of single runs.
-    fn from(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, own: &[f64]) -> Option<Self> {
+    /// The start of a fit of the machine of a case with the element; variables of single runs begin at those of
+    /// another fit to the same logs.
+    fn from(
+        site: &Site<'_, 'a>,
+        row: &'static Extension,
+        extended: Extended,
+        (other, x): (&Problem, &[f64]),
+    ) -> Option<Self> {
         let mut problem = Problem::new(&extended.case, &extended.plan).ok()?.stopped_by(site.found.problem.stop());
         let noise: Vec<_> = problem.quantities().iter().map(|&own| (own, site.deviation(own))).collect();
         problem.swings = site.found.problem.swings;
         problem.weigh_by(&noise);
         let mut start = problem.start();
-        let g = problem.globals();
-        if own.len() == start.len() - g {
-            start[g..].copy_from_slice(own);
+        for index in 0..problem.runs.len().min(other.runs.len()) {
+            let known = other.own_variables(index);
+            for (j, extra) in problem.own_variables(index) {
+                let known = known.iter().find(|(_, known)| known.what == extra.what);
+                start[j] = known.map_or(start[j], |(known, _)| x[*known]);
+            }
         }
-        if let (Telling::Nuisance(value), Some(last)) = (&extended.telling, problem.shared.last()) {
-            start[g - 1] = (value - last.start) / last.unit;
+        if let Telling::Nuisance(what, value) = extended.telling {
+            let place = problem.shared.iter().position(|extra| extra.what == what)?;
+            let Extra { start: zero, unit, .. } = problem.shared[place];
+            start[problem.parameters.len() + place] = (value - zero) / unit;
         }
         if start.len() != problem.variables() || problem.is_stopped() {
             return None;
@@ -97,8 +108,7 @@ impl<'a> Tried<'a> {
         plan.free.extend(later.iter().map(|(key, _)| key.clone()));
         plan.bounds.extend(later);
         let extended = Extended { case, plan, later: Vec::new(), ..self.extended.clone() };
-        let own = &self.best.x[self.problem.globals()..];
-        match Self::from(site, self.row, extended, own) {
+        match Self::from(site, self.row, extended, (&self.problem, &self.best.x)) {
             Some(further) => Some(Self { before: Some(Box::new(self)), ..further }),
             None => Some(self),
         }
@@ -151,7 +161,10 @@ impl<'a> Tried<'a> {
     fn telling(&self) -> Option<usize> {
         match &self.extended.telling {
             Telling::Parameter(key) => self.problem.parameters.iter().position(|own| own.name == *key),
-            Telling::Nuisance(_) => self.problem.globals().checked_sub(1),
+            Telling::Nuisance(what, _) => {
+                let place = self.problem.shared.iter().position(|extra| extra.what == *what);
+                place.map(|place| self.problem.parameters.len() + place)
+            }
             Telling::Apart(_) => None,
         }
     }
@@ -229,12 +242,13 @@ impl<'a> Tried<'a> {
             });
         }
         let mut scatter = None;
-        if let (Telling::Nuisance(_), Some(last), Some(j)) =
-            (&self.extended.telling, self.problem.shared.last(), self.telling())
-        {
-            let error = error(j).map_or(f64::INFINITY, |error| error * last.unit);
-            parameters.push(Size { name: last.what.name(&site.machine), unit: "s", value: self.value(j), error });
-            scatter = stamp::scatter(&self.problem, &self.best.residuals);
+        if let (Telling::Nuisance(what, _), Some(j)) = (&self.extended.telling, self.telling()) {
+            let own = self.problem.shared[j - self.problem.parameters.len()];
+            let error = error(j).map_or(f64::INFINITY, |error| error * own.unit);
+            let unit = what.unit(&site.machine);
+            parameters.push(Size { name: what.name(&site.machine), unit, value: self.value(j), error });
+            let is_delay = *what == Nuisance::Delay;
+            scatter = is_delay.then(|| stamp::scatter(&self.problem, &self.best.residuals)).flatten();
         }
         if let Some([value, error]) = scatter {
             parameters.push(Size { name: "scatter".into(), unit: "s", value, error });
