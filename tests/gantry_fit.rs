@@ -115,8 +115,8 @@ fn exchanged_columns_of_two_motors_are_named() {
 /// The reversed angle of one motor was told as a log that the model does not explain, without a reason.
 #[test]
 fn the_reversed_encoder_of_one_motor_is_named() {
-    for kind in [Kind::CoreXy, Kind::HFrame] {
-        for output in 0..2 {
+    for (kind, outputs) in [(Kind::CoreXy, 2), (Kind::HFrame, 2), (Kind::DualBelt, 3)] {
+        for output in 0..outputs {
             let mut own = with_log(case(kind, &[]), &case(kind, &["cart.mass=0.5"]), None, 3);
             let plan = Plan { free: vec!["cart.mass".into()], ..Plan::default() };
             let is_told = |case: &Case| {

@@ -22,6 +22,9 @@ const FOLDED: f64 = 3.0;
 const FOLD_ALIKE: f64 = 2.0;
 const FOLD_SHARP: f64 = 1.7;
 
+/// Samples from one value to the next that a zero of a magnitude is looked for in, for fast and slow crossings.
+const FOLD_STRIDES: [usize; 3] = [1, 4, 16];
+
 /// The mean speed over a held value is within this factor of the speeds before and behind it.
 const CAUGHT_UP: f64 = 2.0;
 
@@ -179,6 +182,7 @@ impl Channel {
             folds: Vec::new(),
             levels: sorted.len().min(1000),
         };
+        channel.clipped = channel.find_clipped(values, time);
         channel.wraps = channel.count_wraps(values);
         if channel.wraps == 0 {
             channel.held = channel.find_held(values, time);
@@ -187,7 +191,6 @@ impl Channel {
         }
         channel.folds = channel.find_folds(values, time);
         channel.outliers = channel.find_outliers(values, time);
-        channel.clipped = channel.find_clipped(values, time);
         channel
     }
 
@@ -228,28 +231,41 @@ impl Channel {
     }
 
     /// Where |x| turns at zero, if x passes it: samples a, b, c at b's minimum with steps of s on both sides have
-    /// a + c = 2 s, of which a smooth turn has a fifth.
+    /// a + c = 2 s, of which a smooth turn has a fifth. Steps are taken over more samples only where those over fewer do not exceed the noise: a quick turn
+    /// looks sharp in them.
     fn find_folds(&self, values: &[f64], time: &[f64]) -> Vec<f64> {
         let resolution = self.resolution();
         let is_signed = |quantity: Quantity| quantity.is_position() || quantity.is_speed();
         if !self.quantity().is_some_and(is_signed) || self.least < -FOLDED * resolution {
             return Vec::new();
         }
-        let reach = BESIDE + 1;
-        let is_fold = |k: &usize| {
-            let k = *k;
+        let is_fold = |k: usize, (stride, most): (usize, f64)| {
+            let reach = (BESIDE + 1) * stride;
             let step = |from: usize, to: usize| (values[from] - values[to]) / BESIDE as f64;
-            let (fall, rise) = (step(k - reach, k - 1), step(k + reach, k + 1));
+            let (fall, rise) = (step(k - reach, k - stride), step(k + reach, k + stride));
             let both = fall + rise;
-            let apart = values[k - 1] + values[k + 1];
-            let is_least = values[k] <= values[k - 1] && values[k] < values[k + 1];
+            let apart = values[k - stride] + values[k + stride];
+            let is_least = values[k] <= values[k - stride] && values[k] < values[k + stride];
             is_least
-                && fall.min(rise) > FOLDED * resolution
+                && (FOLDED * resolution..most).contains(&fall.min(rise))
                 && (1.0 / FOLD_ALIKE..FOLD_ALIKE).contains(&(fall / rise))
                 && (1.0 / FOLD_SHARP..FOLD_SHARP).contains(&(apart / both))
                 && values[k] < both
         };
-        (reach..values.len().saturating_sub(reach)).filter(is_fold).map(|k| time[k]).collect()
+        let mut folds: Vec<usize> = Vec::new();
+        let mut last = 0;
+        for stride in FOLD_STRIDES {
+            let reach = (BESIDE + 1) * stride;
+            let most = if last == 0 { f64::INFINITY } else { FOLDED * resolution * (stride / last) as f64 };
+            last = stride;
+            for k in reach..values.len().saturating_sub(reach) {
+                if is_fold(k, (stride, most)) && folds.iter().all(|fold| fold.abs_diff(k) > reach) {
+                    folds.push(k);
+                }
+            }
+        }
+        folds.sort_unstable();
+        folds.into_iter().map(|k| time[k]).collect()
     }
 
     /// Runs of equal values of a position that moves on both sides of them, and whose next value is where the motion
@@ -298,34 +314,37 @@ impl Channel {
         let rounding = f64::EPSILON * self.least.abs().max(self.greatest.abs());
         let gaps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|gap| *gap > 4.0 * rounding);
         let resolution = gaps.fold(f64::INFINITY, f64::min).max(self.step.unwrap_or_default());
+        let by_chance = |n: usize, alike: f64| values.len() as f64 * alike.powf(n as f64 - 1.0);
         let mut first = 0;
         for run in values.chunk_by(|a, b| a == b) {
-            let (n, next) = (run.len(), first + run.len());
+            let (start, n) = (first, run.len());
+            first += n;
             let near = n.clamp(NEAR[0], NEAR[1]);
-            let sides = [&values[first.saturating_sub(near)..first], &values[next..(next + near).min(values.len())]];
+            let is_known = self.held.iter().any(|held| held.sample == start + 1)
+                || self.clipped.iter().any(|clipped| clipped.value == run[0] && clipped.samples == n);
+            // Shorter runs are no surprise, whatever is beside them.
+            if n < 2 || is_known || by_chance(n, 1.0 / (near + 1) as f64) >= BY_CHANCE {
+                continue;
+            }
+            let sides = [&values[start.saturating_sub(near)..start], &values[first..(first + near).min(values.len())]];
             let sides: Vec<Side> = sides.into_iter().filter(|side| side.len() >= NEAR[0]).map(Side::of).collect();
             let sigma = sides.iter().map(|side| side.noise).fold(f64::INFINITY, f64::min);
-            let is_known = self.held.iter().any(|held| held.sample == first + 1);
-            if n > 1
-                && !is_known
-                && !sides.is_empty()
-                && sigma > DITHERS * resolution
-                && sides.iter().all(Side::alternates)
-            {
-                // Two values of normal noise are rounded to one step: Δ/(2 √π σ).
-                let alike = resolution / (2.0 * std::f64::consts::PI.sqrt() * sigma);
-                let alike = sides.iter().map(|side| side.repeats).fold(alike, f64::max);
-                if values.len() as f64 * alike.powf(n as f64 - 1.0) < BY_CHANCE {
-                    let travel = if next < values.len() { values[next] - values[first] } else { 0.0 };
-                    let held = Held { sample: first + 1, time: time[first + 1], samples: n - 1, travel };
-                    let is_near = |side: &Side| side.is_at_rest() && (side.mean - run[0]).abs() < BESIDE as f64 * sigma;
-                    match sides.iter().all(is_near) {
-                        true => self.frozen.push(held),
-                        false => self.held.push(held),
-                    }
-                }
+            if sides.is_empty() || sigma <= DITHERS * resolution || !sides.iter().all(Side::alternates) {
+                continue;
             }
-            first = next;
+            // Two values of normal noise are rounded to one step: Δ/(2 √π σ).
+            let alike = resolution / (2.0 * std::f64::consts::PI.sqrt() * sigma);
+            let alike = sides.iter().map(|side| side.repeats).fold(alike, f64::max);
+            if by_chance(n, alike) >= BY_CHANCE {
+                continue;
+            }
+            let travel = values.get(first).map_or(0.0, |next| next - run[0]);
+            let held = Held { sample: start + 1, time: time[start + 1], samples: n - 1, travel };
+            let rests = |side: &Side| side.is_at_rest() && (side.mean - run[0]).abs() < BESIDE as f64 * sigma;
+            match sides.iter().all(rests) {
+                true => self.frozen.push(held),
+                false => self.held.push(held),
+            }
         }
     }
 

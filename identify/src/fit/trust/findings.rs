@@ -39,6 +39,9 @@ pub(crate) fn findings(case: &Case, plan: &Plan, found: &Searched, fit: &Fit, su
     let astray = astray(surveys, &all);
     let follows = ["time-unit", "interruption", "unexplained"];
     all.retain(|one| !(follows.contains(&one.code) && one.log.as_ref().is_some_and(|log| astray.contains(log))));
+    // A sensor that stands still is a part in which the machine does not follow its input.
+    let held: Vec<_> = all.iter().filter(|one| one.code == "held").map(|one| one.log.clone()).collect();
+    all.retain(|one| !(one.code == "interruption" && held.contains(&one.log)));
     let is_named = all.iter().any(|one| one.grade == Grade::Warning || one.code == "other_law") || fit.cause.is_some();
     all.extend(of_noise(found, fit, is_named));
     all.sort_by_key(|finding| std::cmp::Reverse(finding.grade));

@@ -104,7 +104,7 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
     let before = found.problem.counted();
     let is_better = |one: &Mended| match remedy {
         Remedy::Unit(..) | Remedy::Leave(..) => one.left < most(before, one.counted),
-        _ => one.left < NO_WORSE && one.least < most(before, one.counted),
+        _ => one.left < NO_WORSE && one.least() < most(before, one.counted),
     };
     tried.is_empty() || tried.iter().any(is_better)
 }
@@ -148,12 +148,25 @@ pub(crate) fn is_reversed(case: &Case, plan: &Plan, found: &Searched) -> bool {
 pub(crate) struct Mended {
     /// Cost of a value relative to that with the unchanged logs.
     pub left: f64,
-    /// The least such ratio of any quantity.
-    least: f64,
+    /// That ratio for each quantity.
+    parts: Vec<(Quantity, f64)>,
     /// Number of counted values.
     counted: usize,
     /// Greatest ratio of a free value to that of the case, or the other way round; infinite where one is zero.
     pub moved: f64,
+}
+
+impl Mended {
+    /// The least ratio of any quantity.
+    fn least(&self) -> f64 {
+        self.parts.iter().map(|(_, left)| *left).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The ratio of this quantity if it is small and the others are no worse.
+    pub fn corrected(&self, quantity: Quantity) -> Option<f64> {
+        let own = self.parts.iter().find(|(own, _)| *own == quantity).map(|(_, left)| *left);
+        own.filter(|left| *left <= FACTOR_LEAVES && self.left < NO_WORSE)
+    }
 }
 
 /// Mean square of the weighted residuals of each quantity.
@@ -206,15 +219,15 @@ pub(crate) fn mended(
     let own = squares(&found.problem, &found.best.residuals);
     let part = |(quantity, square): (Quantity, f64)| {
         let (_, own) = own.iter().find(|(other, _)| *other == quantity)?;
-        Some(square / own.max(f64::MIN_POSITIVE))
+        Some((quantity, square / own.max(f64::MIN_POSITIVE)))
     };
-    let least = squares(&problem, &end.residuals).into_iter().filter_map(part).fold(f64::INFINITY, f64::min);
+    let parts = squares(&problem, &end.residuals).into_iter().filter_map(part).collect();
     let parameters = problem.parameters.iter().enumerate().filter(|(_, parameter)| parameter.start != 0.0);
     let moved = parameters
         .map(|(j, parameter)| (problem.value(j, end.x[j]) / parameter.start).max(0.0))
         .map(|ratio| ratio.max(1.0 / ratio))
         .fold(1.0, f64::max);
-    Some(Mended { left: cost / counted.max(1) as f64 / before.max(f64::MIN_POSITIVE), least, counted, moved })
+    Some(Mended { left: cost / counted.max(1) as f64 / before.max(f64::MIN_POSITIVE), parts, counted, moved })
 }
 
 /// Result of a short search from `start`, and its cost.

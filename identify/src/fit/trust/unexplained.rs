@@ -135,16 +135,14 @@ fn reversal(
 ) -> Option<Reason> {
     let any = std::iter::once(quantity).chain(others.iter().copied()).filter(|_| !others.is_empty());
     any.into_iter().find_map(|own| {
-        let left = mended(case, plan, found, names, &Remedy::Flip(own), TRIAL_FIT_ITERATIONS)?.left;
-        let name = own.name();
-        (left <= FACTOR_LEAVES).then(|| Reason {
-            code: "sign",
-            text: format!(
-                "with the sign of {name} reversed {:.1} % of the squared residuals are left: swapped wires of its \
-                 encoder, or a sign; set scale = {{ {name} = -1 }}",
-                100.0 * left
-            ),
-        })
+        let flipped = mended(case, plan, found, names, &Remedy::Flip(own), TRIAL_FIT_ITERATIONS)?;
+        let (left, name) = (flipped.corrected(own)?, own.name());
+        let text = format!(
+            "with the sign of {name} reversed {:.1} % of its squared residuals are left: swapped wires of its encoder, \
+             or a sign; set scale = {{ {name} = -1 }}",
+            100.0 * left
+        );
+        Some(Reason { code: "sign", text })
     })
 }
 
