@@ -3,6 +3,7 @@
 
 use nalgebra::{Complex, DVector};
 use std::f64::consts::PI;
+use std::sync::Arc;
 use taut::case::Case;
 use taut::frf::{Cut, Frf, Known, estimate, fit, measure, measured};
 use taut::linear::{Discrete, Hold, Operation, StateSpace};
@@ -198,24 +199,20 @@ fn a_straight_input_is_modelled_as_such() {
 /// A controller's delay that is not in the log is in its margins: they are those of a log that has it.
 #[test]
 fn a_delay_that_the_log_lacks_counts_in_margins() {
-    let folder = tempfile::tempdir().unwrap();
     let stage = stage();
     let text = include_str!("../stages/sollmann-jouaneh/controllers/pid.toml");
     let design = text.split("[controller]").nth(1).unwrap().split("[[move]]").next().unwrap();
     let machine = include_str!("../stages/sollmann-jouaneh/table4.toml").split("[[experiment]]").next().unwrap();
     let margins = |delay_of_log: f64| {
         let log = log(&model(&stage, delay_of_log), &white(60_000, 3.0), None, 1e-6, 60_000);
-        let rows = log.time.iter().zip(&log.inputs[0]).zip(&log.outputs[0].values);
-        let table: String = rows.map(|((t, u), y)| format!("{t:?},{u:?},{y:?}\n")).collect();
-        std::fs::write(folder.path().join("log.csv"), format!("t,u,phi\n{table}")).unwrap();
         let case = format!(
             "{machine}\n[encoder]\nat = \"drive_pulley\"\nlines = 500000\n[controller]{design}\n[[experiment]]\nname = \"log\"\n\
-             log = {{ file = \"log.csv\", time = \"t\", input = \"u\", drive_angle = \"phi\" }}\n"
+             input = {{ step = 0.0 }}\nuntil = 1.0\nevery = 1e-3\n"
         );
-        let path = folder.path().join("case.toml");
-        std::fs::write(&path, case).unwrap();
-        let changes = ["controller.delay=0.5 ms", "belt.damping=[\"6.6 N s/m\", \"6.6 N s/m\", \"2.9 N s/m\"]"];
-        let case = Case::read_with(&path, &changes).unwrap();
+        let mut case = Case::from_text("case.toml", &case).unwrap();
+        case.machine.belt.damping = stage.belt.damping;
+        case.controller.as_mut().unwrap().delay = 0.5e-3;
+        case.experiments[0].log = Some(Arc::new(log));
         let cut = Cut { segment: Some(1.024), period: None };
         let found = measure(&case, &cut, Known::of(&case, None, None, None).unwrap()).unwrap();
         found.responses[0].margins.expect("the encoder's own angle")

@@ -50,10 +50,10 @@ fn plans_keep_the_limits_and_arrive_sooner() {
         for planned in &plans.moves {
             let (best, given) = (&planned.best, &planned.given);
             println!("{seed} {}: {:?}, {given:?}, at least {:?}", planned.name, best.arrival, planned.bound);
-            let short = shortfalls(&case.machine, design.limit, &planned.profiles);
+            let short = shortfalls(&case.machine, design.bounds(), &planned.profiles);
             assert_eq!(short, [], "{seed}");
             // The reserve is left.
-            for load in loads(&case.machine, design.limit, &planned.profiles, 4000) {
+            for load in loads(&case.machine, design.bounds(), &planned.profiles, 4000) {
                 assert!(load.needed <= 0.905 * load.allowed, "{seed}: {load:?}");
             }
             let [sooner, later] = [&best.arrival, given].map(|arrival| arrival.worst.unwrap_or(f64::INFINITY));
@@ -255,9 +255,9 @@ fn a_path_is_planned_within_the_limits_of_all_motors() {
         let plans = plan(&case, &[0], &FREE, &|| false).unwrap();
         let planned = &plans.moves[0];
         println!("{kind}: {:?} {:?} {:?}", planned.best, planned.given, plans.modes);
-        assert_eq!(shortfalls(&case.machine, design.limit, &planned.profiles), []);
+        assert_eq!(shortfalls(&case.machine, design.bounds(), &planned.profiles), []);
         let most = |case: &Case, profiles: &[Profile]| {
-            let loads = loads(&case.machine, design.limit, profiles, 4000);
+            let loads = loads(&case.machine, design.bounds(), profiles, 4000);
             loads.iter().map(|load| load.share()).fold(0.0, f64::max)
         };
         assert!(most(&case, &planned.profiles) <= 0.9 + 1e-9);
@@ -304,7 +304,7 @@ fn a_move_of_the_file_may_be_a_plan() {
     for case in [&slow, &fast] {
         let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
         assert!(motion.is_planned && motion.profile().target() == 0.04);
-        let loads = loads(&case.machine, design.limit, &motion.profiles, 4000);
+        let loads = loads(&case.machine, design.bounds(), &motion.profiles, 4000);
         let most = loads.iter().map(|load| load.share()).fold(0.0, f64::max);
         assert!(most <= 0.9 + 1e-9, "{most}");
         // Peak of jerk, from the pieces of the reference.

@@ -5,7 +5,7 @@ use crate::common::chance::Chance;
 use std::path::Path;
 use taut::case::Case;
 use taut::control::{Setup, closed_loop};
-use taut::design::{FeedForward, FeedForwardModel};
+use taut::design::{Bounds, FeedForward, FeedForwardModel};
 use taut::machine::axis::{CART, DRIVE, IDLER};
 use taut::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
 use taut::machine::{AmplifierMode, BeltModel, Machine, Travel};
@@ -19,6 +19,11 @@ use taut::signal::profile::{Profile, Reference};
 use taut::solve::{Solver, simulate};
 use taut_core::calculator::Run;
 
+/// The bounds of a controller with this limit of its command.
+fn commanded(command: Option<f64>) -> Bounds {
+    Bounds { command, ..Bounds::default() }
+}
+
 /// Most that a reference needs of one of a machine's limits, counted from a pretension of zero.
 fn needed(machine: &Machine, profile: &Profile, limit: &str) -> f64 {
     let mut machine = machine.clone();
@@ -26,7 +31,11 @@ fn needed(machine: &Machine, profile: &Profile, limit: &str) -> f64 {
     (amplifier.voltage_limit, amplifier.current_limit) = (Some(1e9), Some(1e9));
     machine.belt.sheet.allowed_tension = Some(1e9);
     machine.belt.pretension = Some(0.0);
-    loads(&machine, None, std::slice::from_ref(profile), 4000).iter().find(|load| load.limit == limit).unwrap().needed
+    loads(&machine, Bounds::default(), std::slice::from_ref(profile), 4000)
+        .iter()
+        .find(|load| load.limit == limit)
+        .unwrap()
+        .needed
 }
 
 fn case() -> Case {
@@ -115,7 +124,7 @@ fn each_limit_is_named_where_it_is_exceeded() {
         for share in [0.9, 1.1] {
             let mut machine = case.machine.clone();
             let own = set(&mut machine, share * needed);
-            let found = shortfalls(&machine, own, &motion.profiles);
+            let found = shortfalls(&machine, commanded(own), &motion.profiles);
             if share > 1.0 {
                 assert_eq!(found, [], "{limit} at {share}");
                 continue;
@@ -127,7 +136,7 @@ fn each_limit_is_named_where_it_is_exceeded() {
         }
     }
     let names = |limit: f64| -> Vec<&str> {
-        shortfalls(&case.machine, Some(limit), &motion.profiles).iter().map(|short| short.limit).collect()
+        shortfalls(&case.machine, commanded(Some(limit)), &motion.profiles).iter().map(|short| short.limit).collect()
     };
     assert!(names(0.9 * away).contains(&"breakaway") && !names(1.1 * away).contains(&"breakaway"));
 }
@@ -138,7 +147,7 @@ fn the_speed_that_is_reached_is_the_steady_one() {
     let case = case();
     let motion = &case.moves[0];
     let volts = 0.5 * needed(&case.machine, motion.profile(), "voltage");
-    let found = shortfalls(&case.machine, Some(volts), &motion.profiles);
+    let found = shortfalls(&case.machine, commanded(Some(volts)), &motion.profiles);
     let short = found.iter().find(|short| short.limit == "voltage").unwrap();
     let Balance::At(speed) = balanced_speed(&case.machine, volts, 0.1) else { panic!("no steady speed") };
     let told = engineering(speed, "m/s", 3);

@@ -405,6 +405,7 @@ mod tests {
             every: 1e-3,
             length: 256,
             periodic: false,
+            hold: Hold::Zero,
             inputs,
             references: None,
             outputs,
