@@ -141,8 +141,11 @@ fn drawn_machines_go_where_taut_has_them() {
         let positions: Vec<_> =
             columns.iter().filter(|c| c.name.ends_with("_angle") || c.name.ends_with("_position")).collect();
         assert_eq!(positions.len(), bodies, "{:?}", columns.iter().map(|c| &c.name).collect::<Vec<_>>());
-        let of = |ending: &'static str| columns.iter().filter(move |column| column.name.ends_with(ending));
-        let currents: Vec<_> = of("motor_current").zip(of("second_phase_current")).collect();
+        let (second, first): (Vec<_>, Vec<_>) = columns
+            .iter()
+            .filter(|column| column.name.ends_with("_current"))
+            .partition(|column| column.name.contains("second_phase"));
+        let currents: Vec<_> = first.iter().zip(&second).collect();
         assert_eq!(currents.len(), drives);
         let (mut off, mut off_current): (f64, f64) = (0.0, 0.0);
         for k in 1..STEPS {
