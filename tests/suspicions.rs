@@ -354,12 +354,15 @@ fn a_value_that_is_stuck_is_found_in_noise_of_any_size() {
     }
 }
 
+/// A change of a log.
+type Change<'c> = &'c dyn Fn(&mut Log);
+
 /// Equal values of a good log are no stuck reading: at rest without noise, in counts, and with noise that grows with
 /// speed.
 #[test]
 fn equal_values_at_rest_are_no_stuck_reading() {
     for seed in 621..=622 {
-        let logs: [(&str, &dyn Fn(&mut Log)); 5] = [
+        let logs: [(&str, Change); 5] = [
             ("noise", &|_| ()),
             ("counts", &|log| {
                 log.outputs[0].values.iter_mut().for_each(|value| *value = (*value / 5e-5).round() * 5e-5)

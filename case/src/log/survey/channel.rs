@@ -253,11 +253,11 @@ impl Channel {
                 && values[k] < both
         };
         let mut folds: Vec<usize> = Vec::new();
-        let mut last = 0;
+        let mut finer: Option<usize> = None;
         for stride in FOLD_STRIDES {
             let reach = (BESIDE + 1) * stride;
-            let most = if last == 0 { f64::INFINITY } else { FOLDED * resolution * (stride / last) as f64 };
-            last = stride;
+            let most = finer.map_or(f64::INFINITY, |finer| FOLDED * resolution * (stride / finer) as f64);
+            finer = Some(stride);
             for k in reach..values.len().saturating_sub(reach) {
                 if is_fold(k, (stride, most)) && folds.iter().all(|fold| fold.abs_diff(k) > reach) {
                     folds.push(k);

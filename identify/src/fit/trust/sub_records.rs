@@ -31,6 +31,8 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     let whole = &found.problem;
     let g = whole.globals();
     let skipped = plan.windows.is_some() || plan.closed_loop || plan.until.is_some() || judged.inflation < COLOURED;
+    // A window without a turn contains no information on the play of a sensor.
+    let skipped = skipped || plan.nuisance.sensor_play.is_some();
     if skipped || whole.is_stopped() || !judged.identifiability.complete() || found.best.at_bound[..g].contains(&true) {
         return None;
     }
