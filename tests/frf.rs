@@ -191,6 +191,11 @@ fn a_straight_input_is_modelled_as_such() {
     let (stiffness, [low, high]) = right.stiffness;
     assert!((stiffness / 1.2 - 1.0).abs() < 0.01 && low < 1.2 && 1.2 < high, "{:?}", right.stiffness);
     assert!(right.delay.0 < 1e-5 && !right.is_far(), "{:?}, {}", right.delay, right.chi);
+    // Its response is not that of a controller's held command.
+    let design = Case::read("stages/sollmann-jouaneh/controllers/pid.toml").unwrap().controller.unwrap();
+    let frf = &estimate(&made, &cut).unwrap()[0];
+    let refused = measured(&[vec![frf]], 0, &design, &machine, (machine.pulley_radius, 0.0)).unwrap_err();
+    assert!(refused.what.contains("straight"), "{refused}");
     // Taken as held, it is not described, which is said.
     let wrong = found(&Log { hold: taut::signal::Hold::Zero, ..made });
     assert!(wrong.is_far() && !(wrong.stiffness.1[0]..wrong.stiffness.1[1]).contains(&1.2), "{:?}", wrong.stiffness);

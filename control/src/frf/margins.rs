@@ -6,6 +6,7 @@ use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::number::engineering;
+use crate::signal::Hold;
 use nalgebra::{Complex, DMatrix};
 use std::f64::consts::PI;
 
@@ -47,6 +48,10 @@ pub fn measured(
             own.every, design.every
         ))
         .next("log at the controller's samples for margins"));
+    }
+    if own.hold != Hold::Zero {
+        return Err(Error::new("the input of the log is straight between samples, the controller's is held")
+            .next("log a held input for margins"));
     }
     let points: Vec<(f64, DMatrix<Complex<f64>>, f64)> =
         own.coherent().filter_map(|point| at(matrix, point.omega)).collect();

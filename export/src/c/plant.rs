@@ -43,6 +43,9 @@ const SOURCE: &str = include_str!("plant.c");
 const MOTOR: &str = include_str!("motor.c");
 const STEPPER: &str = include_str!("stepper.c");
 
+/// A number of a stepper.
+type Figure<'f> = &'f dyn Fn(&Stepped) -> f64;
+
 /// A plant with its step.
 pub(super) struct Plant<'t> {
     tables: &'t Tables,
@@ -345,7 +348,7 @@ impl<'t> Plant<'t> {
         );
         text += &list("uint8_t", "SHAFT", whole(&steppers.iter().map(|own| own.shaft).collect::<Vec<_>>()));
         text += &list("uint8_t", "SINE", whole(&steppers.iter().map(|own| own.sine).collect::<Vec<_>>()));
-        let columns: [(&str, &dyn Fn(&Stepped) -> f64); 7] = [
+        let columns: [(&str, Figure); 7] = [
             ("TURNS", &|own| own.phases.teeth * own.per_input / (2.0 * PI)),
             ("WAY", &|own| 1.0 / own.per_input),
             ("MICROSTEP", &|own| own.microstep.unwrap_or(0.0)),
