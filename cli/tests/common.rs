@@ -31,7 +31,7 @@ pub fn taut_in(folder: impl AsRef<Path>) -> Command {
     command
 }
 
-/// What the program does in the folder of the project.
+/// Runs the program in the folder of the project.
 pub fn taut(args: &[&str]) -> Output {
     taut_in(root()).args(args).output().unwrap()
 }

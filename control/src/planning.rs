@@ -167,7 +167,7 @@ fn two_sided(machine: &Machine) -> Machine {
     machine
 }
 
-/// What a run has shown.
+/// Results of a run.
 struct Ran {
     /// Time of arrival of the cart, s.
     arrives: Option<f64>,

@@ -24,7 +24,7 @@ impl Folder {
         std::fs::write(self.join(name), content).map_err(|error| format!("{name}: {error}"))
     }
 
-    /// What a program writes that ends well in this folder.
+    /// Runs a program in this folder, which must succeed; returns its output.
     pub(crate) fn run(&self, program: &Path, words: &[&str]) -> Result<String, String> {
         let mut command = Command::new(program);
         command.current_dir(&self.0).args(words).env("PYTHONDONTWRITEBYTECODE", "1");

@@ -1,4 +1,4 @@
-//! Whatever can be drawn: a figure over one axis, a plane, a drawing.
+//! Pictures: a figure over one axis, a plane, a drawing.
 
 use super::{Figure, Plane};
 

@@ -161,7 +161,7 @@ fn machine(family: &Family, corner: &Corner, own: &Margins) -> Value {
     })
 }
 
-/// What is certain about the loop on every machine of the family.
+/// Certificate of the loop for every machine of the family.
 fn certificate(family: &Family, own: &Certificate) -> Value {
     let bounds = own
         .bounds

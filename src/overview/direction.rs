@@ -12,7 +12,7 @@ pub(super) struct Direction {
     pub sliding: f64,
     /// That of the pulleys and rotors that turn then, at the belt, kg.
     pub turning: f64,
-    /// What a gear's loss leaves out of the rotors, at the belt, kg.
+    /// Mass of the rotors that a gear's loss leaves out, at the belt, kg.
     unfelt: f64,
     /// `_x` or `_y` at the end of keys; empty where there is one direction.
     suffix: &'static str,

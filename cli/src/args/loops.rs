@@ -234,8 +234,8 @@ pub struct Shape {
     /// Also try pairs of shapers in series: for two modes, or for a mode that varies along the travel
     #[arg(long)]
     pub pairs: bool,
-    /// Two spectra of a CoreXY, TEST_RESONANCES AXIS=1,1 (belt A) and AXIS=1,-1 (belt B): report which belt is looser and
-    /// by how much
+    /// Two spectra of a CoreXY, TEST_RESONANCES AXIS=1,1 (belt A) and AXIS=1,-1 (belt B): report which belt is looser
+    /// and by how much
     #[arg(long)]
     pub belts: bool,
     /// Case files only: relative uncertainty of the frequencies [default: 0.1]
@@ -252,9 +252,9 @@ pub struct Shape {
 ///
 /// Linearises the machine of a case while everything slides, and prints the resonances along the travel of an axis or
 /// over the working area of a gantry, rigid and elastic modes, and poles with frequency and damping; with --sample-time
-/// also the discrete-time model. --verbose adds gain and zeros from each drive to each output. With --out it also writes modes.json
-/// with the matrices, frequency-response.csv, map.csv (a gantry whose spans follow bridge and cart), and a report with
-/// Bode diagrams, maps, and poles and zeros.
+/// also the discrete-time model. --verbose adds gain and zeros from each drive to each output. With --out it also
+/// writes modes.json with the matrices, frequency-response.csv, map.csv (a gantry whose spans follow bridge and cart),
+/// and a report with Bode diagrams, maps, and poles and zeros.
 #[derive(Debug, clap::Args)]
 #[command(after_help = MODES)]
 pub struct Modes {

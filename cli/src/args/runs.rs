@@ -105,10 +105,10 @@ Examples:
 
 /// Run a case many times with its parameters varied.
 ///
-/// Prints the distribution of the main figures and the parameters that each depends on, with --verbose of all that vary.
-/// With --out FILE it writes a row
-/// for each run, as Parquet (units in its metadata) or CSV; with --out DIR also a summary, a report and plots. The same
-/// command resumes an interrupted or killed one. Rows are the same, bit for bit, on any number of threads.
+/// Prints the distribution of the main figures and the parameters that each depends on, with --verbose of all that
+/// vary. With --out FILE it writes a row for each run, as Parquet (units in its metadata) or CSV; with --out DIR also a
+/// summary, a report and plots. The same command resumes an interrupted or killed one. Rows are the same, bit for bit,
+/// on any number of threads.
 #[derive(Debug, clap::Args)]
 #[command(after_help = SWEEP, mut_arg("out", |out| out.value_name("FILE or DIR").help(
     "The file of the rows (ends in .parquet or .csv), or the folder for it, a summary, a report and plots"

@@ -51,7 +51,7 @@ fn watched(case: &Case, plan: &Plan, quiet: bool) -> Result<Check, Failure> {
     }
 }
 
-/// What the logs determine, in a line.
+/// Verdict on the logs in a line.
 fn verdict(found: &Check) -> String {
     match &found.identifiability {
         _ if !found.tells() => "these logs determine none of the free parameters".into(),

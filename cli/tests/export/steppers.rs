@@ -19,8 +19,8 @@ struct Drawn {
     commands: Vec<Vec<f64>>,
 }
 
-/// Smooth ways there and back, so slow that no command jumps by more than two full steps, but for `hasty` ones, too fast
-/// for the motor.
+/// Smooth ways there and back, so slow that no command jumps by more than two full steps, but for `hasty` ones, too
+/// fast for the motor.
 fn drawn(seed: u64) -> Drawn {
     let mut uniform = random(seed);
     let mut between = |low: f64, high: f64| low + (high - low) * uniform();

@@ -82,7 +82,7 @@ impl<'a> Accuracy<'a> {
         Ok(error.map(|error| PositionError { value: error.value.max(bound), ..error }))
     }
 
-    /// What the estimate for a move of this machine is based on, in words.
+    /// Basis of the estimate for a move of this machine, in words.
     pub fn basis(machine: &Machine) -> &'static str {
         ErrorEstimate::basis(Solver::of(machine), is_sampled(machine))
     }

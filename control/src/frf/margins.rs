@@ -31,8 +31,8 @@ pub struct Measured {
 }
 
 /// Margins of a design with the responses of the positions measured by its drives, one row of `matrix` for each;
-/// `length` is metres per unit of these, `late` a delay that they do not contain, s. Gain and phase margin belong to the
-/// loop of `drive`.
+/// `length` is metres per unit of these, `late` a delay that they do not contain, s. Gain and phase margin belong to
+/// the loop of `drive`.
 pub fn measured(
     matrix: &[Vec<&Frf>],
     drive: usize,

@@ -74,7 +74,7 @@ struct Matrices {
     bodies: Vec<usize>,
     /// Diagonal of M.
     mass: DVector<f64>,
-    /// What is added to it: (row, column, value), of a cart that rides on a bridge that yaws.
+    /// Additional elements (row, column, value), of a cart that rides on a bridge that yaws.
     coupled: Vec<(usize, usize, f64)>,
     stiffness: DMatrix<f64>,
     damping: DMatrix<f64>,

@@ -37,7 +37,7 @@ pub(crate) fn assumptions(machine: &Machine, operation: Operation) -> Vec<String
     words
 }
 
-/// What the poles include and [`Natural`](super::Natural) modes do not.
+/// Effects that the poles include and [`Natural`](super::Natural) modes do not.
 fn differences_of_modes(machine: &Machine, plant: &Mechanism, operation: Operation) -> Vec<String> {
     let mut words = Vec::new();
     let is_curved = |body: usize| {

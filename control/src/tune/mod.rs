@@ -116,7 +116,7 @@ pub struct Tuned {
     pub modes: Vec<f64>,
     /// True if gains were searched for, not only judged.
     pub searched: bool,
-    /// What is certain about the tuned loop on every machine of the family, drawn or not.
+    /// Certificate of the tuned loop for every machine of the family, drawn or not.
     pub certificate: Certificate,
 }
 

@@ -187,7 +187,7 @@ impl Geometry {
         self.spans.iter().enumerate().filter(move |(_, span)| is_own(span)).map(|(index, _)| index)
     }
 
-    /// What yaw adds to a sum over span elongations that is `own` per a ψ: those of the spans are taken off.
+    /// Change by yaw of a sum over span elongations that is `own` per a ψ, without the elongations of the spans.
     pub fn left_to_yaw(&self, own: f64, sum: &[(usize, f64)]) -> f64 {
         own - sum.iter().map(|&(span, weight)| weight * self.spans[span].on_yaw).sum::<f64>()
     }

@@ -147,7 +147,7 @@ impl Machine {
         })
     }
 
-    /// What the cart adds on a bridge that yaws.
+    /// Contribution of the cart on a bridge that yaws.
     fn ride(&self) -> Option<Ride> {
         let (slides, yaw, bridge) = (self.geometry().slides, self.yaw_body()?, self.bridge.as_ref()?);
         let gravity = GRAVITY * bridge.inclination.sin();

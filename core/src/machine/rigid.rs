@@ -155,7 +155,7 @@ impl Rigid {
         (c.name("amperes", current), per_ampere)
     }
 
-    /// What of a force passes through a gear with losses: not what the rotor itself takes.
+    /// Part of a force that passes through a gear with losses, without the part that accelerates the rotor.
     fn passed<C: Calculator>(&self, c: &mut C, force: C::N, acceleration: C::N) -> C::N {
         match self.is_shared() {
             true => c.name("passed", force - acceleration * self.rotor),

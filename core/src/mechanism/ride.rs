@@ -140,7 +140,7 @@ impl RideLaw {
         Carried { force, excess: turning - lightness * force }
     }
 
-    /// What the ride takes from the force on a body, N or N m.
+    /// Reduction of the force on a body by the ride, N or N m.
     pub fn force(&self, on: Ridden, at: &Riding) -> f64 {
         let Carried { force, excess } = self.carried(at);
         match on {

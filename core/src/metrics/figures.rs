@@ -101,7 +101,7 @@ pub enum Only {
     Yaw,
 }
 
-/// What a machine may have beside the parts of its kind.
+/// Optional properties of a machine beside the parts of its kind.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Extras {
     /// Steppers.

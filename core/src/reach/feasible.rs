@@ -117,7 +117,7 @@ impl Load {
 struct Tension {
     limit: &'static str,
     allowed: f64,
-    /// What a span requires at rest, N, and per force relative to the pretension.
+    /// Requirement of a span at rest, N, and per force relative to the pretension.
     line: [f64; 2],
     words: [&'static str; 3],
 }
@@ -140,7 +140,7 @@ impl Tension {
         slack.into_iter().chain(tension).filter(|_| belt.model != BeltModel::Rigid).collect()
     }
 
-    /// What a span with this force relative to the pretension requires, N.
+    /// Requirement of a span with this force relative to the pretension, N.
     fn needed(&self, force: f64) -> f64 {
         let [at_rest, per_force] = self.line;
         at_rest + per_force * force

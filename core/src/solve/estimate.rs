@@ -95,7 +95,7 @@ impl ErrorEstimate {
         }
     }
 
-    /// What the error of a run is based on, in words: a bound for the exact solver with given inputs, else a second run.
+    /// Basis of the error of a run, in words: a bound for the exact solver with given inputs, else a second run.
     pub fn basis(first: Solver, is_sampled: bool) -> &'static str {
         match first {
             Solver::General { .. } if is_sampled => "a second run with a hundredth of the tolerance",

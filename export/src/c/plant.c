@@ -1,8 +1,9 @@
 /* --- the plant ------------------------------------------------------------------------------------------------------ */
 /*
- * z = (states, products, inputs, 1). In a mode, what all elements do together, every state's rate is a row of weights on
- * z, and the mode holds while no guard, a row too, is below zero. A product is that of two places of z before it. A step is a chain of Taylor series of z; the first fall of a
- * guard along a series is an event, located to the last bit, after which the rows of the next mode hold.
+ * z = (states, products, inputs, 1). In a mode, what all elements do together, every state's rate is a row of weights
+ * on z, and the mode holds while no guard, a row too, is below zero. A product is that of two places of z before it. A
+ * step is a chain of Taylor series of z; the first fall of a guard along a series is an event, located to the last bit,
+ * after which the rows of the next mode hold.
  */
 
 @tables@

@@ -339,7 +339,7 @@ impl<'t> Plant<'t> {
         text
     }
 
-    /// What is known of each stepper.
+    /// Tables of the steppers.
     fn steppers(&self, whole: &dyn Fn(&[usize]) -> Vec<String>) -> String {
         let steppers = &self.tables.steppers;
         let mut text = String::from(

@@ -25,7 +25,7 @@ const PRODUCTS: usize = 7;
 /// Phases of a drive.
 const PHASES: usize = 2;
 
-/// What the limit of a phase's voltage does, by its codes.
+/// States of the limit of a phase's voltage, by their codes.
 const LIMITS: [Limit; 3] = [Limit::Low, Limit::Inside, Limit::High];
 
 /// A stepper of a machine in tables.

@@ -401,7 +401,7 @@ pub fn family(work: &Work) -> String {
     format!("{off}{loads}{places}: {level}")
 }
 
-/// What is certain about the tuned loop on every machine of the family: what is proven, and the nearest violation.
+/// Certificate of the tuned loop for every machine of the family: what is proven, and the nearest violation.
 pub fn certificate(work: &Work) -> Vec<String> {
     let (family, own) = (&work.tuned.family, &work.tuned.certificate);
     let spread = |factor: f64| match family.source {

@@ -230,9 +230,9 @@ impl Channel {
         self.quantity().is_some_and(|quantity| quantity.is_position())
     }
 
-    /// Where |x| turns at zero, if x passes it: samples a, b, c at b's minimum with steps of s on both sides have
-    /// a + c = 2 s, of which a smooth turn has a fifth. Steps are taken over more samples only where those over fewer do not exceed the noise: a quick turn
-    /// looks sharp in them.
+    /// Where |x| turns at zero, if x passes it: samples a, b, c at b's minimum with steps of s on both sides have a + c
+    /// = 2 s, of which a smooth turn has a fifth. Steps are taken over more samples only where those over fewer do not
+    /// exceed the noise: a quick turn looks sharp in them.
     fn find_folds(&self, values: &[f64], time: &[f64]) -> Vec<f64> {
         let resolution = self.resolution();
         let is_signed = |quantity: Quantity| quantity.is_position() || quantity.is_speed();

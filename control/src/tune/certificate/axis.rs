@@ -25,7 +25,7 @@ const MACHINES: usize = 20_000;
 const CONFIRMED: usize = 60;
 const SAME: f64 = 5e-11;
 
-/// What a parameter of the box is.
+/// The meaning of a parameter of the box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Of {
     /// An independent unknown of the family, by its number.
@@ -63,7 +63,7 @@ struct Sampler<'a> {
     unit: f64,
     /// Also from the command to the position of the cart.
     has_scale: bool,
-    /// What the weight of each machine is divided by.
+    /// Divisor of the weight of each machine.
     weight: f64,
 }
 

@@ -152,7 +152,7 @@ impl Table {
     }
 }
 
-/// What is to be shown: limits of |S| and |T| at the breaks of a loop; infinite if one is not asked.
+/// Limits of |S| and |T| at the breaks of a loop that are to be proven; infinite for one that is not asked.
 pub(super) struct Question<'a> {
     pub axis: &'a Axis<'a>,
     pub feedback: &'a Feedback,
@@ -163,7 +163,7 @@ pub(super) struct Question<'a> {
     pub delay: f64,
 }
 
-/// What a cell shows.
+/// Result for a cell.
 pub(super) enum Seen {
     /// All limits hold, and the loop has no pole on the unit circle.
     Holds,

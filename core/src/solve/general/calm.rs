@@ -1,10 +1,11 @@
 //! Rest on bent bristles.
 //!
-//! Bristles never stick: a body that they hold comes to rest by an oscillation that decays, but never ends. Once what is
-//! left of it moves no body by more than a small part of the tolerance, until the input changes, bodies count as at rest.
+//! Bristles never stick: a body that they hold comes to rest by an oscillation that decays, but never ends. Once what
+//! is left of it moves no body by more than a small part of the tolerance, until the input changes, bodies count as at
+//! rest.
 //!
-//! With bristles of stiffness σ at each body that moves, the stiffness matrix is at least diag(σ), and with damping c of
-//! each, the energy of an oscillation decays at least as fast as e^{−2λt}:
+//! With bristles of stiffness σ at each body that moves, the stiffness matrix is at least diag(σ), and with damping c
+//! of each, the energy of an oscillation decays at least as fast as e^{−2λt}:
 //!
 //! ```text
 //! E ≤ ½ Σ m v² + ½ Σ (m a)²/σ          λ = ½ min(c/m, σ/c)

@@ -181,7 +181,7 @@ impl Field {
         self.linear.arguments = self.linear.outputs.len();
     }
 
-    /// What a cart on a bridge that yaws adds; the arguments that are accelerations.
+    /// Adds the sources of a cart on a bridge that yaws; returns the arguments that are accelerations.
     fn add_ride(&mut self) -> Vec<usize> {
         let model = Arc::clone(&self.model);
         let Some(ride) = model.mechanism.ride else { return Vec::new() };

@@ -354,14 +354,14 @@ impl Model {
         own - self.ridden_at_rest(body, mode, y)
     }
 
-    /// What a ride takes from the load on a body that rests.
+    /// Reduction of the load on a body at rest by a ride.
     fn ridden_at_rest(&self, body: usize, mode: &Mode, y: &[f64]) -> f64 {
         let mut resting = *mode;
         self.mechanism.followers(body).for_each(|body| resting.motion[body] = Motion::Stuck);
         self.ridden(&resting, y)[body]
     }
 
-    /// What a ride takes from the forces on its bodies in this mode, N or N m.
+    /// Reduction of the forces on its bodies by a ride in this mode, N or N m.
     fn ridden(&self, mode: &Mode, y: &[f64]) -> [f64; BODIES] {
         let mut ridden = [0.0; BODIES];
         let mechanism = &*self.mechanism;

@@ -35,7 +35,7 @@ pub(super) enum Source {
     Torque(Phasing),
     /// Nonlinear part of the rate of a phase current, by the number of the phase, A/s.
     Phase(usize, Phasing),
-    /// What a cart on a bridge that yaws takes from the force on one of its bodies.
+    /// Reduction of the force on a body by a cart on a bridge that yaws.
     Ride { on: Ridden, law: RideLaw, arguments: Riding<Argument> },
 }
 

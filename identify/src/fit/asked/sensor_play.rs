@@ -18,7 +18,7 @@ pub(crate) struct SensorPlay {
     pub ahead: f64,
 }
 
-/// What moves a reading from one row to the next.
+/// Contact that moves a reading from one row to the next.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Contact {
     Free,
@@ -83,7 +83,7 @@ impl Run {
         Some(SensorPlay { width, ahead: self.extra(Nuisance::SensorStart(quantity), extras).unwrap_or(0.5) })
     }
 
-    /// What the sensor of output `index` reads where the model has these values: with its play, its sign lost, and its
+    /// Readings of the sensor of output `index` for these values of the model: with its play, its sign lost, and its
     /// bias.
     pub(crate) fn read(&self, index: usize, values: &[f64], extras: &[f64]) -> Vec<f64> {
         let mut read = match self.sensor_play(index, extras) {

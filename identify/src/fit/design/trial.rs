@@ -185,7 +185,7 @@ pub(super) fn samples(every: f64, duration: f64) -> Vec<f64> {
     (0..=grid.intervals()).map(|k| grid.time(k)).collect()
 }
 
-/// What a log of inputs has to say of the time between its samples: that they are held where they switch, and a line
+/// Interpolation between the samples of inputs in a log: held if they switch, and a straight line
 /// otherwise, whichever is nearer in the middle.
 pub(super) fn hold(inputs: &[Signal], time: &[f64]) -> Hold {
     let mut off = [0.0; 2];

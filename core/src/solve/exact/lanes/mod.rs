@@ -140,7 +140,7 @@ fn run_queue<'a>(mechanism: &Mechanism, degree: usize, jobs: &mut dyn Iterator<I
     }
 }
 
-/// What is kept between the runs of a machine.
+/// Data kept between the runs of a machine.
 struct Kept<const N: usize, const S: usize, const D: usize> {
     mechanism: Arc<Mechanism>,
     space: Arc<Space>,

@@ -1,4 +1,4 @@
-//! What stands between the logged input and the motor's torque: a limit of the amplifier, and the inductance of the
+//! Elements between the logged input and the torque of the motor: a limit of the amplifier, and the inductance of the
 //! motor.
 
 use super::extension::{Extended, Fitted, Said, Site, Telling, shown};
