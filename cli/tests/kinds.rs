@@ -30,8 +30,20 @@ const WITH_LOGS: [&str; 2] = ["stages/h-frame/belts.toml", "stages/core-xy/belts
 const STEPPERS: [&str; 2] = ["stages/stepper-axis/stepper-axis.toml", "stages/printer-core-xy/printer.toml"];
 
 /// Commands that take a stepper; all others refuse it.
-const WITH_STEPPER: [&str; 11] =
-    ["show", "simulate", "modes", "sweep", "move", "plan", "check", "shape", "frf", "export json", "export fmu"];
+const WITH_STEPPER: [&str; 12] = [
+    "show",
+    "simulate",
+    "modes",
+    "sweep",
+    "move",
+    "plan",
+    "check",
+    "shape",
+    "frf",
+    "export c",
+    "export json",
+    "export fmu",
+];
 
 /// Of whatever does not.
 const NO_MOTOR: Ends = Refused("this needs a motor that is commanded by voltage or current");
