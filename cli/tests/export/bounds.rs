@@ -1,13 +1,10 @@
 //! The most operations of a step of an exported plant: counted, against the bounds that its header states.
 
-use super::c::{MACHINES, exported};
+use super::c::{MACHINES, STEPPER, exported};
 use super::machines::commands;
 use super::tools::{are_there, file, run, write_doubles};
 use std::fs;
 use taut::case::Case;
-
-/// A machine with a stepper, whose commands jump by less than two full steps.
-const STEPPER: (&str, &[&str], f64) = ("stages/stepper-axis/stepper-axis.toml", &[], 1.5e-4);
 
 /// A step once computed 25,499 products where the header said 11,536: halvings, turns of root-finding and changes of
 /// mode were left out.

@@ -48,6 +48,9 @@ pub const MACHINES: [(&str, &[&str], f64); 12] = [
     ("stages/dual-belt/dual-belt.toml", &[], 6.0),
 ];
 
+/// A machine with a stepper, whose commands jump by less than two full steps.
+pub const STEPPER: (&str, &[&str], f64) = ("stages/stepper-axis/stepper-axis.toml", &[], 1.5e-4);
+
 /// The bundled controllers: every structure, feed-forward, observer and filter.
 pub const CONTROLLERS: [&str; 13] = [
     "cascade-current",
@@ -110,7 +113,7 @@ fn compilers_and_analysers_find_nothing() {
     }
     let controllers: Vec<String> =
         CONTROLLERS.iter().map(|name| format!("stages/sollmann-jouaneh/controllers/{name}.toml")).collect();
-    let plants = MACHINES.iter().map(|(case, changes, _)| (*case, *changes));
+    let plants = MACHINES.iter().chain([&STEPPER]).map(|(case, changes, _)| (*case, *changes));
     let all = plants.chain(controllers.iter().map(|case| (case.as_str(), &[][..])));
     for (k, (case, changes)) in all.enumerate() {
         for real in ["double", "float"] {
