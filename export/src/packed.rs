@@ -58,7 +58,7 @@ impl Packed {
                 packed.reset_values.push(*value);
             }
         }
-        let none = [Row { depends: Vec::new(), weights: vec![vec![0.0; tables.size()]], forms: Vec::new() }];
+        let none = [Row::constant(vec![0.0; tables.size()])];
         let forces = if tables.forces.is_empty() { &none[..] } else { &tables.forces };
         for (k, rows) in [&*tables.currents, &tables.voltages, forces].into_iter().enumerate() {
             packed.outputs[k] = packed.entry_first.len() as i64;

@@ -111,6 +111,13 @@ pub struct Row {
     pub(super) forms: Vec<Form>,
 }
 
+impl Row {
+    /// One row, which no element changes.
+    pub(super) fn constant(weights: Vec<f64>) -> Self {
+        Self { depends: Vec::new(), weights: vec![weights], forms: Vec::new() }
+    }
+}
+
 /// A condition of a mode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TableGuard {
@@ -285,7 +292,7 @@ impl Tables {
             if drive < inputs {
                 weights[first + inputs + drive] = 1.0;
             }
-            self.rates.push(Row { depends: Vec::new(), weights: vec![weights], forms: Vec::new() });
+            self.rates.push(Row::constant(weights));
             self.states.push(StateName { name: format!("input_{drive}"), unit: "" });
         }
         self.layout.states += 2 * inputs;

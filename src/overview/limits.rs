@@ -3,6 +3,7 @@
 use super::direction::{Direction, Resistance};
 use super::{Group, Note, Place, stepper, told};
 use crate::case::Case;
+use crate::design::Design;
 use crate::machine::{Amplifier, AmplifierMode, BeltModel, BeltSheet, Machine, Motor};
 use crate::signal::Signal;
 
@@ -12,10 +13,11 @@ pub(super) fn limits(case: &Case, directions: &[Direction], origin: &Place, note
         return stepper::limits(machine);
     }
     let inputs = case.experiments.iter().flat_map(|done| done.inputs.iter().map(|input| (input, done.until)));
-    let most = most(case.controller.as_ref().and_then(|design| design.limit), inputs);
+    let bounds = case.controller.as_ref().map(Design::bounds).unwrap_or_default();
+    let most = most(bounds.command, inputs);
     let r = machine.pulley_radius;
-    let held = case.controller.as_ref().and_then(|design| design.bounds().current);
-    let power = |unit: &crate::machine::DriveUnit| Power::of(&unit.motor, &unit.amplifier, r, (most.as_ref(), held));
+    let power =
+        |unit: &crate::machine::DriveUnit| Power::of(&unit.motor, &unit.amplifier, r, (most.as_ref(), bounds.current));
     let Some(powers) = machine.drives.iter().map(power).collect::<Option<Vec<_>>>() else {
         let text = "nothing bounds the input: give amplifier.voltage_limit or current_limit to see the largest speed and \
                     acceleration";

@@ -13,7 +13,7 @@ use taut::signal::profile::Reference;
 use tempfile::TempDir;
 
 /// Warnings that every compiler is asked for.
-pub const STRICT: [&str; 8] =
+const STRICT: [&str; 8] =
     ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wconversion", "-ffp-contract=off", "-O2"];
 
 /// A processor with single precision in hardware.
@@ -441,7 +441,8 @@ fn what_cannot_go_on_is_a_status() {
     assert_eq!(compiled(folder.path()), Some(2));
 }
 
-fn compiled(folder: &Path) -> Option<i32> {
+/// Compiles the harness of plants here and runs it: its status.
+pub fn compiled(folder: &Path) -> Option<i32> {
     run(folder, "gcc", &["-O2", "plant.c", "model.c", "-o", "here"]);
     super::tools::try_to(folder, &folder.join("here"), &[]).status.code()
 }

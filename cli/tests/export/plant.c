@@ -1,4 +1,5 @@
-/* Steps a plant along the commands in in.bin and writes the ways of its bodies after each step into out.bin. */
+/* Steps a plant along the commands in in.bin and writes the ways of its bodies after each step into out.bin; of steppers
+   (STEPPERS) both currents of each drive, too, and prints the lost steps. */
 #include "clock.h"
 #include "model.h"
 #include <stdio.h>
@@ -30,10 +31,21 @@ int main(void)
             double way = (double)now.position[k];
             fwrite(&way, sizeof way, 1, out);
         }
+#ifdef STEPPERS
+        for (k = 0; k < MODEL_DRIVES; k++) {
+            double currents[2] = {(double)now.current[k], (double)now.second_current[k]};
+            fwrite(currents, sizeof currents, 1, out);
+        }
+#endif
         steps++;
     }
     printf("steps %lu status %d events %lu instructions %lu at most %lu\n", steps, status,
            (unsigned long)model_events(), clock_sum / (steps ? steps : 1), clock_most);
+#ifdef STEPPERS
+    for (k = 0; k < MODEL_DRIVES; k++) {
+        printf("lost %ld\n", (long)now.lost_steps[k]);
+    }
+#endif
     fclose(in);
     fclose(out);
     return status;

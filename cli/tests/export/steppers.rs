@@ -1,8 +1,8 @@
 //! Machines with steppers in C, drawn at random, against taut's own solver along the same held commands.
 
-use super::c::STRICT;
+use super::c::{compiled, run_here};
 use super::machines::random;
-use super::tools::{are_there, doubles, file, run, taut, try_to, write_doubles};
+use super::tools::{are_there, doubles, taut, write_doubles};
 use std::fmt::Write;
 use std::fs;
 use taut::case::Case;
@@ -19,8 +19,7 @@ struct Drawn {
     commands: Vec<Vec<f64>>,
 }
 
-/// Smooth ways there and back, so slow that no command jumps by more than two full steps, but for `hasty` ones, too
-/// fast for the motor.
+/// Smooth ways there and back, in which no command jumps by more than two full steps; some are too fast for the motor.
 fn drawn(seed: u64) -> Drawn {
     let mut uniform = random(seed);
     let mut between = |low: f64, high: f64| low + (high - low) * uniform();
@@ -95,22 +94,18 @@ fn drawn(seed: u64) -> Drawn {
 
 fn exported(drawn: &Drawn, options: &[&str]) -> TempDir {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(folder.path().join("case.toml"), &drawn.case).unwrap();
-    let words = [&["export", "c", "case.toml", "--out", "model.c"], options].concat();
-    let output = taut(folder.path(), &words);
-    assert!(output.status.success(), "{}\n{}", String::from_utf8_lossy(&output.stderr), drawn.case);
-    fs::copy(file("cli/tests/export/stepper.c"), folder.path().join("stepper.c")).unwrap();
-    folder
+    let case = folder.path().join("case.toml");
+    fs::write(&case, &drawn.case).unwrap();
+    super::c::exported(case.to_str().unwrap(), &[], options)
 }
 
 /// Runs it: what it writes, and the lost steps.
 fn in_c(drawn: &Drawn, options: &[&str]) -> (Vec<f64>, Vec<i32>) {
     let folder = exported(drawn, options);
     write_doubles(&folder.path().join("in.bin"), drawn.commands.iter().flatten().copied());
-    let compile = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all", "stepper.c", "model.c", "-o", "here"];
-    run(folder.path(), "gcc", &[&STRICT[..], &compile].concat());
-    let told = run(folder.path(), folder.path().join("here"), &[]);
-    let lost = told.split_whitespace().map(|word| word.parse().unwrap()).collect();
+    let options = ["-DSTEPPERS", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    let told = run_here(folder.path(), "plant.c", &options);
+    let lost = told.lines().filter_map(|line| line.strip_prefix("lost ")).map(|steps| steps.parse().unwrap()).collect();
     (doubles(&folder.path().join("out.bin")), lost)
 }
 
@@ -198,11 +193,11 @@ fn what_a_stepper_cannot_follow_is_a_status() {
     }
     let drawn = drawn(500);
     let folder = exported(&drawn, &[]);
-    run(folder.path(), "gcc", &["-O2", "stepper.c", "model.c", "-o", "here"]);
     for (command, status) in [(f64::NAN, 3), (1e9, 3), (5e-3, 4), (0.0, 0)] {
         write_doubles(&folder.path().join("in.bin"), vec![command; drawn.commands[0].len()]);
-        assert_eq!(try_to(folder.path(), &folder.path().join("here"), &[]).status.code(), Some(status), "{command}");
+        assert_eq!(compiled(folder.path()), Some(status), "{command}");
     }
+    fs::write(folder.path().join("case.toml"), &drawn.case).unwrap();
     for (target, part, word) in [("c", "controller", "no controller"), ("st", "controller", "stepper")] {
         let output = taut(folder.path(), &["export", target, "case.toml", "--part", part, "--out", "other.c"]);
         assert!(!output.status.success());

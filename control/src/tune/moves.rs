@@ -1,11 +1,12 @@
 //! Moves for the judgement of a controller, and the current that they require.
 
+use super::trouble::limit;
 use crate::case::{Case, Move};
 use crate::control::measures_cart;
 use crate::design::{Design, FeedForward, FeedForwardModel};
 use crate::error::Result;
+use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
-use crate::machine::{AmplifierMode, Machine};
 use crate::reach::compensation::Compensation;
 use crate::reach::forward::Forward;
 use crate::signal::profile::{Leg, Limits, Profile, Reference};
@@ -85,15 +86,7 @@ fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
 /// Speed (m/s) and acceleration (m/s²) with a reserve below the limits of controller and amplifier.
 fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
     let rigid = Rigid::of(machine);
-    let amplifier = match machine.drives[0].amplifier.mode {
-        AmplifierMode::Voltage => {
-            machine.drives[0].amplifier.voltage_limit.map(|limit| limit / machine.drives[0].amplifier.gain.abs())
-        }
-        AmplifierMode::Current | AmplifierMode::Position => {
-            machine.drives[0].amplifier.current_limit.map(|limit| limit / machine.drives[0].amplifier.gain.abs())
-        }
-    };
-    let Some(limit) = [design.limit, amplifier].into_iter().flatten().reduce(f64::min) else { return MODEST };
+    let Some(limit) = limit(machine, design) else { return MODEST };
     let dry = rigid.coulomb[0];
     let push = |speed: f64| rigid.command(dry + rigid.viscous[0] * speed, 0.0, &Reference::steady(speed)).abs();
     // The command is linear in speed.

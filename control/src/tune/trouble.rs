@@ -137,7 +137,8 @@ fn unstable(machine: &Machine, design: &Design, at: Operation) -> Option<f64> {
     (!margins.stable).then_some(margins.at / (2.0 * PI))
 }
 
-fn limit(machine: &Machine, design: &Design) -> Option<f64> {
+/// The tighter limit of the command, of the controller or the amplifier, in units of the input.
+pub(super) fn limit(machine: &Machine, design: &Design) -> Option<f64> {
     let amplifier = match machine.drives[0].amplifier.mode {
         AmplifierMode::Voltage => machine.drives[0].amplifier.voltage_limit,
         AmplifierMode::Current | AmplifierMode::Position => machine.drives[0].amplifier.current_limit,

@@ -164,6 +164,20 @@ static void refreshed(void)
 
 /* --- Taylor series and their roots --- */
 
+/* The k-th terms of the products, by the terms of their factors up to there. */
+static void multiply_terms(@name@_real terms[][SIZE], uint32_t k)
+{
+    uint32_t i;
+    uint32_t j;
+    for (i = 0U; i < PRODUCTS; i++) {
+        @name@_real sum = R(0.0);
+        for (j = 0U; j <= k; j++) {
+            sum += terms[j][PRODUCT[i].one] * terms[k - j][PRODUCT[i].other];
+        }
+        terms[k][STATES + i] = sum;
+    }
+}
+
 /* z over a distance: term[k] is that of s^k for s from 0 to 1. */
 static void expand(@name@_real distance)
 {
@@ -185,13 +199,7 @@ static void expand(@name@_real distance)
             }
             term[k][i] = sum * factor;
         }
-        for (i = 0U; i < PRODUCTS; i++) {
-            @name@_real sum = R(0.0);
-            for (j = 0U; j <= k; j++) {
-                sum += term[j][PRODUCT[i].one] * term[k - j][PRODUCT[i].other];
-            }
-            term[k][STATES + i] = sum;
-        }
+        multiply_terms(term, k);
         for (i = FIRST_INPUT; i < SIZE; i++) {
             term[k][i] = R(0.0);
         }
@@ -262,13 +270,7 @@ static void expand_sizes(@name@_real distance)
             }
             term_size[k][i] = sum * factor;
         }
-        for (i = 0U; i < PRODUCTS; i++) {
-            @name@_real sum = R(0.0);
-            for (j = 0U; j <= k; j++) {
-                sum += term_size[j][PRODUCT[i].one] * term_size[k - j][PRODUCT[i].other];
-            }
-            term_size[k][STATES + i] = sum;
-        }
+        multiply_terms(term_size, k);
         for (i = FIRST_INPUT; i < SIZE; i++) {
             term_size[k][i] = R(0.0);
         }

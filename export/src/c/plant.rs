@@ -236,17 +236,14 @@ impl<'t> Plant<'t> {
     }
 
     pub(super) fn source(&self, writer: &Writer) -> String {
-        let microsteps = self.tables.steppers.iter().filter_map(|own| own.microstep.map(|way| 1.0 / way));
-        let farthest = self.tables.steppers.iter().zip(microsteps).map(|(own, per_metre)| {
-            // Microsteps in an electrical turn.
-            MICROSTEPS / (per_metre * 2.0 * own.farthest)
-        });
-        let turns = self.number(farthest.fold(TURNS, f64::min));
+        // Electrical turns of as many microsteps.
+        let farthest = |own: &Stepped| own.microstep.map(|microstep| MICROSTEPS * microstep / (2.0 * own.farthest));
+        let turns = self.tables.steppers.iter().filter_map(farthest).fold(TURNS, f64::min);
         let limits = [
             ("@halvings@", &*HALVINGS_OF_STEP.to_string()),
             ("@newton@", &*NEWTON.to_string()),
             ("@circular@", &*CIRCULAR.to_string()),
-            ("@turns@", &*turns),
+            ("@turns@", &*self.number(turns)),
         ];
         let [commands, told, hold, read] = match self.tables.steppers.is_empty() {
             true => [MOTOR, "", "", ""],
@@ -254,10 +251,7 @@ impl<'t> Plant<'t> {
                 STEPPER,
                 "    @name@_real told[@NAME@_DRIVES]; /* positions that the fields are told, m */\n",
                 "    hold_rotors(position);\n",
-                "    for (i = 0U; i < @NAME@_DRIVES; i++) {\n        const @name@_real lag = plant.told[i] - \
-                 (out->position[SHAFT[i]] * WAY[i]);\n        out->second_current[i] = value_of(row_of(OTHER_TABLE + i, \
-                 plant.does));\n        out->second_voltage[i] = value_of(row_of(OTHER_TABLE + @NAME@_DRIVES + i, \
-                 plant.does));\n        out->lost_steps[i] = 4 * nearest(lag * TURNS[i]);\n    }\n",
+                "    read_steppers(out);\n",
             ],
         };
         let source = SOURCE.replace("@tables@", self.tables().trim_end()).replace("@commands@", commands.trim_end());

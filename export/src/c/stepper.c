@@ -114,3 +114,15 @@ static @name@_status take_input(const @name@_real input[])
     }
     return plant.status;
 }
+
+/* Outputs of the second phases, and how far the rotors are behind. */
+static void read_steppers(@name@_output *out)
+{
+    uint32_t i;
+    for (i = 0U; i < @NAME@_DRIVES; i++) {
+        const @name@_real lag = plant.told[i] - (out->position[SHAFT[i]] * WAY[i]);
+        out->second_current[i] = value_of(row_of(OTHER_TABLE + i, plant.does));
+        out->second_voltage[i] = value_of(row_of(OTHER_TABLE + @NAME@_DRIVES + i, plant.does));
+        out->lost_steps[i] = 4 * nearest(lag * TURNS[i]);
+    }
+}

@@ -101,10 +101,10 @@ impl Tables {
                     Some(element) => {
                         Row { depends: vec![element], weights: LIMITS.map(of).to_vec(), forms: Vec::new() }
                     }
-                    None => constant(of(Limit::Inside)),
+                    None => Row::constant(of(Limit::Inside)),
                 };
                 self.rates.push(row(&|limit| at.current_rate(phase, own, limit)));
-                let current = constant(at.row(&[(at.current(phase), 1.0)]));
+                let current = Row::constant(at.row(&[(at.current(phase), 1.0)]));
                 let voltage = row(&|limit| at.voltage(phase, own, limit));
                 if phase == 0 {
                     self.currents.push(current);
@@ -114,7 +114,7 @@ impl Tables {
                 }
             }
             for rate in [(product(0), own.teeth), (product(1), -own.teeth)] {
-                self.rates.push(constant(at.row(&[rate])));
+                self.rates.push(Row::constant(at.row(&[rate])));
             }
             let key = mechanism.drives[drive].label.key;
             for (name, unit) in [("current", "A"), ("second_current", "A"), ("sine", ""), ("cosine", "")] {
@@ -183,7 +183,7 @@ impl Tables {
                 breakaways: None,
                 drop: 0.0,
                 gently: None,
-                row: constant(weights),
+                row: Row::constant(weights),
             });
         }
         element
@@ -246,11 +246,6 @@ impl Places {
         row.iter_mut().for_each(|weight| *weight /= phases.inductance);
         row
     }
-}
-
-/// A row that no element changes.
-fn constant(weights: Vec<f64>) -> Row {
-    Row { depends: Vec::new(), weights: vec![weights], forms: Vec::new() }
 }
 
 /// The mechanism with drives whose inputs are their torques, N m.

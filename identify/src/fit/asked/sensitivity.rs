@@ -76,8 +76,7 @@ impl Problem<'_> {
                 Some(Extra { what: Nuisance::SensorStart(of), unit, .. }) if of == run.seen[i].quantity => [0.0, unit],
                 _ => [0.0; 2],
             };
-            play.differentiate(values, slopes.iter_mut().zip(columns.iter().map(by)));
-            *values = play.read(values);
+            *values = play.differentiate(values, slopes.iter_mut().zip(columns.iter().map(by)));
         }
         for (i, (seen, (values, slopes))) in run.seen.iter().zip(&slopes).enumerate() {
             for (&j, slopes) in columns.iter().zip(slopes) {

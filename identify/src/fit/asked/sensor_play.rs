@@ -54,11 +54,15 @@ impl SensorPlay {
         self.contacts(positions).0
     }
 
-    /// The derivatives of the reading, in place of those of the positions, by variables on which width and share
-    /// depend as given: (dw, dc).
-    pub fn differentiate<'s>(self, positions: &[f64], slopes: impl Iterator<Item = (&'s mut Vec<f64>, [f64; 2])>) {
+    /// The reading of these positions, and its derivatives in place of those of the positions, by variables on which
+    /// width and share depend as given: (dw, dc).
+    pub fn differentiate<'s>(
+        self,
+        positions: &[f64],
+        slopes: impl Iterator<Item = (&'s mut Vec<f64>, [f64; 2])>,
+    ) -> Vec<f64> {
         let Self { width: w, ahead: c } = self;
-        let (_, contacts) = self.contacts(positions);
+        let (read, contacts) = self.contacts(positions);
         for (slopes, [dw, dc]) in slopes {
             let mut dz = slopes.first().copied().unwrap_or_default();
             for (slope, contact) in slopes.iter_mut().zip(&contacts) {
@@ -72,6 +76,7 @@ impl SensorPlay {
                 *slope = dz;
             }
         }
+        read
     }
 }
 
@@ -115,7 +120,8 @@ mod tests {
         let at = [1.0, 0.3, 0.4];
         let mut slopes = [y(1.0), vec![0.0; 60], vec![0.0; 60]];
         let by = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
-        SensorPlay { width: at[1], ahead: at[2] }.differentiate(&y(at[0]), slopes.iter_mut().zip(by));
+        let own = SensorPlay { width: at[1], ahead: at[2] }.differentiate(&y(at[0]), slopes.iter_mut().zip(by));
+        assert_eq!(own, read(at));
         for (j, slope) in slopes.iter().enumerate() {
             let moved = |by: f64| {
                 let mut own = at;
