@@ -389,7 +389,7 @@ fn known(cell: &Cell, case: &Case, plan: &Plan, truth: [f64; 3], noise: &[(Quant
 
 /// The results of the fits of a cell.
 #[derive(Default)]
-struct Found {
+struct CellResults {
     machines: usize,
     /// Intervals that hold the truth, of the parameters and of the force at tested speeds.
     held: [usize; 4],
@@ -403,7 +403,7 @@ struct Found {
     refused: usize,
 }
 
-fn one(cell: &Cell, seed: u64, found: &Mutex<Found>) {
+fn one(cell: &Cell, seed: u64, found: &Mutex<CellResults>) {
     let mut chance = Chance(Pcg64::seed_from_u64(seed));
     let truth = [chance.between(10.0, 35.0), chance.between(0.1, 1.5), chance.between(0.2, 1.0)];
     let case = recorded(cell, truth, &mut chance);
@@ -612,7 +612,7 @@ fn main() -> ExitCode {
         if !only.is_empty() && !only.iter().any(|words| cell.name.contains(words.as_str())) {
             continue;
         }
-        let found = Mutex::new(Found::default());
+        let found = Mutex::new(CellResults::default());
         let first = seed.wrapping_mul(1_000_003) + 100_000 * place as u64;
         for_each(machines, threads, |k| one(cell, first + k, &found));
         let mut found = found.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());

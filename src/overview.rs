@@ -45,7 +45,7 @@ pub struct Overview {
     /// The rows, by what they are about.
     pub groups: Vec<Group>,
     /// With the cart at several places, where the place makes a difference; else at one.
-    pub places: Vec<Place>,
+    pub places: Vec<FiguresAt>,
     /// True if the place makes a difference.
     pub depends_on_place: bool,
     /// Notes.
@@ -80,7 +80,7 @@ pub struct Row {
 
 /// The machine with cart (and bridge) at one place.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Place {
+pub struct FiguresAt {
     /// x of the cart of an axis; x of the bridge and y of the cart of a gantry, m.
     pub position: Vec<f64>,
     /// Stiffness of each span there, N/m.

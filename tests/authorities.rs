@@ -9,7 +9,7 @@ use crate::common;
 use serde_json::Value;
 use taut::case::Experiment;
 use taut::friction::{Friction, Side};
-use taut::machine::{Amplifier, AmplifierMode, Belt, DriveUnit, Kind, Machine, Motor, Pulley, Slide};
+use taut::machine::{Amplifier, AmplifierMode, Belt, DriveUnit, Machine, MachineKind, Motor, Pulley, Slide};
 use taut::signal::Signal;
 use taut::solve::{Ending, Solver, simulate};
 
@@ -30,7 +30,7 @@ fn machine(value: &Value) -> Machine {
     let get = |key| number(value, key);
     let pulley = |inertia, law| Pulley { inertia: get(inertia), friction: friction(&value[law]) };
     Machine {
-        kind: Kind::Axis,
+        kind: MachineKind::Axis,
         drives: vec![DriveUnit {
             motor: Motor {
                 torque_constant: get("torque_constant"),

@@ -5,7 +5,7 @@ use crate::common::chance::Chance;
 use crate::common::logged::logged;
 use std::sync::Arc;
 use taut::case::{Case, Per, Plan, TEMPLATE};
-use taut::fit::compare::{FrictionLaw, Setting, compare};
+use taut::fit::compare::{ComparisonOptions, FrictionLaw, compare};
 use taut::fit::{drift, fit, residual_force, together};
 use taut::log::Log;
 use taut::signal::Hold;
@@ -37,8 +37,8 @@ fn plan(free: &[&str]) -> Plan {
     Plan { free: free.iter().map(|key| key.to_string()).collect(), ..Plan::default() }
 }
 
-fn whole(laws: &[FrictionLaw]) -> Setting {
-    Setting { laws: laws.to_vec(), windows: vec![None] }
+fn whole(laws: &[FrictionLaw]) -> ComparisonOptions {
+    ComparisonOptions { laws: laws.to_vec(), windows: vec![None] }
 }
 
 const SIDED: [&str; 2] = ["cart.friction.viscous_backward=26", "cart.friction.coulomb_backward=0.9"];
@@ -75,7 +75,7 @@ fn curved_laws_come_to_an_end() {
     let windows = vec![None, Some(1.2)];
     let keys = ["cart.friction.viscous", "cart.friction.coulomb"];
     for (law, tried, simulations) in [(FrictionLaw::Stribeck, 2, 8000), (FrictionLaw::Along, 1, 10_000)] {
-        let setting = Setting { laws: vec![FrictionLaw::Coulomb, law], windows: windows.clone() };
+        let setting = ComparisonOptions { laws: vec![FrictionLaw::Coulomb, law], windows: windows.clone() };
         let found =
             compare(&case, "axis.toml".as_ref(), &plan(&keys), &setting, None, &mut |_| Flow::Continue).unwrap();
         let of = |law| found.candidates.iter().filter(move |one| one.law == law);
@@ -93,18 +93,18 @@ fn curved_laws_come_to_an_end() {
 #[test]
 fn what_cannot_be_compared_is_refused() {
     let case = made(&[], 1);
-    let told = |setting: &Setting| {
+    let told = |setting: &ComparisonOptions| {
         let found = compare(&case, "axis.toml".as_ref(), &plan(&["cart.friction.viscous"]), setting, None, &mut |_| {
             Flow::Continue
         });
         found.unwrap_err().to_string()
     };
-    let none = Setting { laws: Vec::new(), windows: vec![None] };
+    let none = ComparisonOptions { laws: Vec::new(), windows: vec![None] };
     assert_eq!(
         told(&none),
         "there is nothing to compare\n  next: name a law and a length of windows, or leave both out"
     );
-    let never = Setting { laws: vec![FrictionLaw::Coulomb], windows: vec![Some(-1.0)] };
+    let never = ComparisonOptions { laws: vec![FrictionLaw::Coulomb], windows: vec![Some(-1.0)] };
     assert_eq!(told(&never), "-1 s is not a length of windows\n  allowed: above zero");
     assert_eq!(
         FrictionLaw::named("dry").unwrap_err().to_string(),

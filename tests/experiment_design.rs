@@ -2,7 +2,7 @@
 //! said where none can be designed.
 
 use taut::case::{Case, TEMPLATE};
-use taut::fit::experiment_design::{Criterion, Kind, Request, Shape, design, verify};
+use taut::fit::experiment_design::{Criterion, Excitation, Request, Shape, design, verify};
 use taut::log::Quantity;
 use taut::machine::Channel;
 use taut::solve::{Solver, simulate};
@@ -11,7 +11,7 @@ fn template() -> Case {
     Case::from_text("axis.toml", TEMPLATE).unwrap()
 }
 
-fn request(names: &[&str], kinds: &[Kind]) -> Request {
+fn request(names: &[&str], kinds: &[Excitation]) -> Request {
     Request {
         names: names.iter().map(|name| name.to_string()).collect(),
         kinds: kinds.to_vec(),
@@ -29,7 +29,7 @@ fn noisy(quantity: Quantity, noise: f64) -> Channel {
 fn promises_hold_on_simulated_logs() {
     let case = template();
     let names = ["cart.mass", "cart.friction.coulomb", "cart.friction.viscous"];
-    for kind in [Kind::Trapezoid, Kind::Multisine] {
+    for kind in [Excitation::Trapezoid, Excitation::Multisine] {
         let measured = vec![noisy(Quantity::DriveAngle, 2e-3)];
         let request = Request { measured, doubt: 0.0, ..request(&names, &[kind]) };
         let found = design(&case, &request, &|| false, &mut |_| {}).unwrap();
@@ -48,7 +48,7 @@ fn promises_hold_on_simulated_logs() {
 #[test]
 fn promises_for_an_encoder_alone_are_kept() {
     let case = template();
-    let request = Request { doubt: 0.0, ..request(&["cart.mass", "cart.friction.viscous"], &[Kind::Trapezoid]) };
+    let request = Request { doubt: 0.0, ..request(&["cart.mass", "cart.friction.viscous"], &[Excitation::Trapezoid]) };
     let found = design(&case, &request, &|| false, &mut |_| {}).unwrap();
     assert_eq!(found.measured.len(), 1);
     for one in verify(&case, &request, &found, 24, &|| false).unwrap() {
@@ -60,7 +60,7 @@ fn promises_for_an_encoder_alone_are_kept() {
 #[test]
 fn a_promise_that_fits_do_not_keep_is_reported() {
     let case = template();
-    let request = request(&["cart.mass", "belt.stiffness"], &[Kind::Prbs]);
+    let request = request(&["cart.mass", "belt.stiffness"], &[Excitation::Prbs]);
     let found = design(&case, &request, &|| false, &mut |_| {}).unwrap();
     for one in verify(&case, &request, &found, 4, &|| false).unwrap() {
         let promise = found.promises.iter().find(|promise| promise.name == one.name).unwrap();
@@ -79,7 +79,7 @@ fn a_promise_that_fits_do_not_keep_is_reported() {
 fn promises_hold_on_machines_that_are_off() {
     let case = template();
     let measured = vec![noisy(Quantity::DriveAngle, 2e-3)];
-    let request = Request { measured, ..request(&["cart.mass", "cart.friction.coulomb"], &[Kind::Trapezoid]) };
+    let request = Request { measured, ..request(&["cart.mass", "cart.friction.coulomb"], &[Excitation::Trapezoid]) };
     let found = design(&case, &request, &|| false, &mut |_| {}).unwrap();
     for one in verify(&case, &request, &found, 16, &|| false).unwrap() {
         assert!((0.4..2.0).contains(&one.ratio) && one.fits == 16 && one.coverage > 0.7, "{one:?}");
@@ -92,7 +92,7 @@ fn a_machine_alone_has_a_design() {
     let machine = TEMPLATE.split("[[experiment]]").next().unwrap();
     let case = Case::from_text("axis.toml", machine).unwrap();
     assert!(case.experiments.is_empty() && case.fit.is_none());
-    let limits = Request { input: Some(6.0), travel: Some(0.1), ..request(&["cart.mass"], &[Kind::Trapezoid]) };
+    let limits = Request { input: Some(6.0), travel: Some(0.1), ..request(&["cart.mass"], &[Excitation::Trapezoid]) };
     let found = design(&case, &limits, &|| false, &mut |_| {}).unwrap();
     assert!(found.promises[0].is_determined() && found.own.is_empty() && found.reached.way(0) <= 0.0901);
     let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
@@ -106,7 +106,7 @@ fn no_promise_is_better_than_the_model() {
     let case = template();
     for model_error in [0.0, 0.01, 0.05] {
         let measured = vec![noisy(Quantity::DriveAngle, 1e-6)];
-        let request = Request { measured, model_error, ..request(&["cart.mass"], &[Kind::Trapezoid]) };
+        let request = Request { measured, model_error, ..request(&["cart.mass"], &[Excitation::Trapezoid]) };
         let found = design(&case, &request, &|| false, &mut |_| {}).unwrap();
         let [promise] = &found.promises[..] else { panic!("{:?}", found.promises) };
         assert!(promise.random < 1e-3 * promise.value, "{promise:?}");
@@ -114,7 +114,7 @@ fn no_promise_is_better_than_the_model() {
         let root = promise.random.hypot(model_error * promise.value);
         assert!((promise.error / root - 1.0).abs() < 1e-9, "{promise:?}");
     }
-    let wild = Request { model_error: 1.0, ..request(&["cart.mass"], &[Kind::Trapezoid]) };
+    let wild = Request { model_error: 1.0, ..request(&["cart.mass"], &[Excitation::Trapezoid]) };
     let told = design(&case, &wild, &|| false, &mut |_| {}).unwrap_err().to_string();
     assert!(told.contains("a model error of 1 cannot be"), "{told}");
 }
@@ -125,7 +125,7 @@ fn a_design_tells_more_than_a_pulse() {
     let case = template();
     let names = ["cart.mass", "cart.friction.coulomb", "cart.friction.viscous"];
     for criterion in [Criterion::D, Criterion::A] {
-        let request = Request { criterion, ..request(&names, &[Kind::Trapezoid]) };
+        let request = Request { criterion, ..request(&names, &[Excitation::Trapezoid]) };
         let found = design(&case, &request, &|| false, &mut |_| {}).unwrap();
         let pulse = found.own.iter().find(|own| own.name == "5 V pulse").unwrap();
         assert!(found.score < 0.6 * pulse.score, "{} {}", found.score, pulse.score);
@@ -138,7 +138,7 @@ fn a_design_tells_more_than_a_pulse() {
 fn what_is_written_is_what_was_judged_and_keeps_its_limits() {
     let travel = "\n[travel]\nmin = \"-20 mm\"\nmax = \"40 mm\"\n";
     let case = Case::from_text("axis.toml", &format!("{TEMPLATE}{travel}")).unwrap();
-    for kind in Kind::ALL {
+    for kind in Excitation::ALL {
         let request = Request { duration: 0.6, current: Some(2.0), ..request(&["cart.mass"], &[kind]) };
         let found = design(&case, &request, &|| false, &mut |_| {}).unwrap();
         let text = found.case_text(&case, "axis.toml".as_ref()).unwrap();
@@ -166,7 +166,7 @@ fn what_is_written_is_what_was_judged_and_keeps_its_limits() {
 fn what_no_input_can_tell_is_told() {
     let case = template();
     let names = ["cart.friction.viscous", "drive_pulley.friction.viscous", "cart.mass"];
-    let request = request(&names, &[Kind::Trapezoid]);
+    let request = request(&names, &[Excitation::Trapezoid]);
     let mut machine = case.clone();
     machine.machine.belt.model = taut::machine::BeltModel::Rigid;
     machine.machine.drive_pulley.friction = taut::friction::Friction::symmetric(1e-3, 1e-3);
@@ -190,14 +190,14 @@ fn a_search_that_is_ended_says_what_it_has() {
     let calls = std::sync::atomic::AtomicUsize::new(0);
     let stop = || calls.fetch_add(1, std::sync::atomic::Ordering::Relaxed) > 20;
     let found = design(&template(), &request, &stop, &mut |_| {}).unwrap();
-    assert!(found.interrupted && found.alternatives.len() < Kind::ALL.len(), "{:?}", found.alternatives);
+    assert!(found.interrupted && found.alternatives.len() < Excitation::ALL.len(), "{:?}", found.alternatives);
 }
 
 #[test]
 fn what_cannot_be_designed_is_told() {
     let case = template();
     let told = |case: &Case, request: &Request| design(case, request, &|| false, &mut |_| {}).unwrap_err().to_string();
-    let one = request(&["cart.mass"], &[Kind::Trapezoid]);
+    let one = request(&["cart.mass"], &[Excitation::Trapezoid]);
     let nothing = Request { names: Vec::new(), ..one.clone() };
     assert!(told(&case, &nothing).contains("there is nothing to determine: the case has no [fit]"));
     let unknown = request(&["cart.mas"], &[]);

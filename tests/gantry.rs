@@ -4,7 +4,7 @@ use crate::common;
 use serde_json::Value;
 use taut::case::Case;
 use taut::linear::{Analysis, Natural, Question, Root};
-use taut::machine::Kind;
+use taut::machine::MachineKind;
 use taut::metrics::{Meter, Metrics, Peak};
 use taut::solve::{Course, Detail, ErrorEstimate, Event, Flow, Solver, stream_mechanism};
 use taut::trajectory::Trajectory;
@@ -108,11 +108,11 @@ fn peaks(metrics: &Metrics) -> Vec<Peak> {
 fn stretches(case: &Case, q: [&[f64]; 4]) -> Vec<Vec<f64>> {
     let r = case.machine.pulley_radius;
     let arms: &[[f64; 4]] = match case.machine.kind {
-        Kind::HFrame => &[[r, 0.0, 1.0, 1.0], [0.0, -r, 1.0, -1.0], [-r, r, -2.0, 0.0]],
-        Kind::Axis | Kind::CoreXy => {
+        MachineKind::HFrame => &[[r, 0.0, 1.0, 1.0], [0.0, -r, 1.0, -1.0], [-r, r, -2.0, 0.0]],
+        MachineKind::Axis | MachineKind::CoreXy => {
             &[[r, 0.0, -1.0, -1.0], [-r, 0.0, 1.0, 1.0], [0.0, r, -1.0, 1.0], [0.0, -r, 1.0, -1.0]]
         }
-        Kind::DualBelt => unreachable!("the authority has H-frames and CoreXY"),
+        MachineKind::DualBelt => unreachable!("the authority has H-frames and CoreXY"),
     };
     let at = |arms: &[f64; 4], row: usize| arms.iter().zip(q).map(|(arm, column)| arm * column[row]).sum();
     arms.iter().map(|arms| (0..q[0].len()).map(|row| at(arms, row)).collect()).collect()

@@ -2,7 +2,7 @@
 //! the motors that tell most.
 
 use taut::case::Case;
-use taut::fit::experiment_design::{Driven, Kind, Request, design, verify};
+use taut::fit::experiment_design::{Driven, Excitation, Request, design, verify};
 use taut::log::Quantity;
 use taut::machine::Channel;
 use taut::solve::{Solver, simulate};
@@ -14,7 +14,7 @@ fn request(names: &[&str], measured: &[Quantity]) -> Request {
     let channel = |&quantity: &Quantity| Channel { quantity, step: None, noise: 2e-3, range: None };
     Request {
         names: names.iter().map(|name| name.to_string()).collect(),
-        kinds: vec![Kind::Trapezoid],
+        kinds: vec![Excitation::Trapezoid],
         duration: 1.0,
         doubt: 0.1,
         input: Some(6.0),

@@ -4,16 +4,16 @@
 use crate::common::chance::Chance;
 use std::sync::Arc;
 use taut::case::{Case, Plan};
-use taut::fit::compare::{FrictionLaw, Setting, compare};
+use taut::fit::compare::{ComparisonOptions, FrictionLaw, compare};
 use taut::fit::{Fit, check, drift, fit};
 use taut::log::{Log, Output, Quantity};
-use taut::machine::Kind;
+use taut::machine::MachineKind;
 use taut::signal::Hold;
 use taut::solve::{Flow, Solver, simulate};
 use taut::trajectory::Trajectory;
 
 /// Bits of 8 V on all motors, each with its own.
-fn inputs(kind: Kind) -> String {
+fn inputs(kind: MachineKind) -> String {
     let bits = |(drive, side): (usize, &str)| format!("{side} = {{ prbs = 8, bit = 0.005, seed = {} }}", 3 + 5 * drive);
     let all: Vec<String> = kind.geometry().sides().enumerate().map(bits).collect();
     format!("experiment.0.input={{ {} }}", all.join(", "))
@@ -23,11 +23,11 @@ fn inputs(kind: Kind) -> String {
 const COUNT: f64 = std::f64::consts::TAU / 10_000.0;
 
 /// A stage of this kind with one experiment on both motors.
-fn case(kind: Kind, changes: &[&str]) -> Case {
+fn case(kind: MachineKind, changes: &[&str]) -> Case {
     let file = match kind {
-        Kind::HFrame => "stages/h-frame/h-frame.toml",
-        Kind::DualBelt => "stages/dual-belt/dual-belt.toml",
-        Kind::Axis | Kind::CoreXy => "stages/core-xy/core-xy.toml",
+        MachineKind::HFrame => "stages/h-frame/h-frame.toml",
+        MachineKind::DualBelt => "stages/dual-belt/dual-belt.toml",
+        MachineKind::Axis | MachineKind::CoreXy => "stages/core-xy/core-xy.toml",
     };
     let rows = [&*inputs(kind), "experiment.0.until=0.5", "experiment.0.every=1ms"];
     let mut case = Case::read_with(file, &[&rows, changes].concat()).unwrap();
@@ -36,7 +36,7 @@ fn case(kind: Kind, changes: &[&str]) -> Case {
 }
 
 /// The log of a run: angles of all motors in counts, and positions with noise of a standard deviation, m.
-fn logged(run: &Trajectory, kind: Kind, positions: Option<f64>, seed: u64) -> Log {
+fn logged(run: &Trajectory, kind: MachineKind, positions: Option<f64>, seed: u64) -> Log {
     let mut chance = Chance::new(seed);
     let column = |name: &str| run.get(name).unwrap().to_vec();
     let output = |quantity: Quantity, values: Vec<f64>| Output { quantity, absolute: false, values };
@@ -98,7 +98,7 @@ fn belts_of_core_xy(free: &[&str]) -> Plan {
 /// helped, and said to change a sign.
 #[test]
 fn exchanged_columns_of_two_motors_are_named() {
-    for kind in [Kind::CoreXy, Kind::HFrame] {
+    for kind in [MachineKind::CoreXy, MachineKind::HFrame] {
         let mut own = with_log(case(kind, &[]), &case(kind, &["cart.mass=0.5"]), None, 3);
         let log = Arc::make_mut(own.experiments[0].log.as_mut().unwrap());
         let (one, other) = (log.outputs[0].quantity, log.outputs[1].quantity);
@@ -115,7 +115,7 @@ fn exchanged_columns_of_two_motors_are_named() {
 /// The reversed angle of one motor was told as a log that the model does not explain, without a reason.
 #[test]
 fn the_reversed_encoder_of_one_motor_is_named() {
-    for (kind, outputs) in [(Kind::CoreXy, 2), (Kind::HFrame, 2), (Kind::DualBelt, 3)] {
+    for (kind, outputs) in [(MachineKind::CoreXy, 2), (MachineKind::HFrame, 2), (MachineKind::DualBelt, 3)] {
         for output in 0..outputs {
             let mut own = with_log(case(kind, &[]), &case(kind, &["cart.mass=0.5"]), None, 3);
             let plan = Plan { free: vec!["cart.mass".into()], ..Plan::default() };
@@ -179,7 +179,7 @@ fn coverage(machines: u64) -> Coverage {
         let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
         let positions = (seed % 2 == 0).then_some(5e-6);
         let alike = ["belt.stiffness=[1e5, 1e5, 1e5, 1e5]"];
-        let own = with_log(case(Kind::CoreXy, &alike), &case(Kind::CoreXy, &changes), positions, seed);
+        let own = with_log(case(MachineKind::CoreXy, &alike), &case(MachineKind::CoreXy, &changes), positions, seed);
         let result = fitted(&own, &belts_of_core_xy(&FREE));
         found.blamed += usize::from(result.findings.iter().any(|one| one.code == "noise"));
         let is_known = result.is_complete() && result.estimates.iter().all(|one| !one.at_bound);
@@ -218,7 +218,7 @@ fn intervals_of_gantries_hold_the_truth_about_as_often_as_they_say() {
 #[test]
 fn an_h_frame_is_fitted_with_all_three_spans() {
     let truth = ["belt.stiffness=[1.2e5, 0.9e5, 0.6e5]", "left_drive.motor.resistance=0.74", "cart.mass=0.4"];
-    let own = with_log(case(Kind::HFrame, &[]), &case(Kind::HFrame, &truth), Some(2e-6), 5);
+    let own = with_log(case(MachineKind::HFrame, &[]), &case(MachineKind::HFrame, &truth), Some(2e-6), 5);
     let free = ["belt.stiffness.0", "belt.stiffness.1", "belt.stiffness.2", "left_drive.motor.resistance", "cart.mass"];
     let plan = Plan { free: free.map(String::from).to_vec(), ..Plan::default() };
     let found = fitted(&own, &plan);
@@ -244,7 +244,7 @@ fn a_dual_belt_is_fitted_with_the_logs_of_three_motors() {
     truth.push(format!("belt.stiffness={spans:?}"));
     let truth: Vec<&str> = truth.iter().map(String::as_str).collect();
     let alike = ["belt.stiffness=[1e5, 1e5, 1e5, 1e5, 1e5, 1e5]"];
-    let own = with_log(case(Kind::DualBelt, &alike), &case(Kind::DualBelt, &truth), None, 13);
+    let own = with_log(case(MachineKind::DualBelt, &alike), &case(MachineKind::DualBelt, &truth), None, 13);
     let tie = |belt: usize| [2 * belt, 2 * belt + 1].map(|span| format!("belt.stiffness.{span}")).to_vec();
     let plan = Plan { free: free.map(String::from).to_vec(), tied: (0..3).map(tie).collect(), ..Plan::default() };
     let found = fitted(&own, &plan);
@@ -259,7 +259,8 @@ fn a_dual_belt_is_fitted_with_the_logs_of_three_motors() {
 /// Out and back of a CoreXY's belt are stretched alike: only the sum of their stiffnesses shows.
 #[test]
 fn spans_of_one_belt_show_by_their_sum() {
-    let own = with_log(case(Kind::CoreXy, &[]), &case(Kind::CoreXy, &["belt.stiffness.2=1.1e5"]), None, 7);
+    let own =
+        with_log(case(MachineKind::CoreXy, &[]), &case(MachineKind::CoreXy, &["belt.stiffness.2=1.1e5"]), None, 7);
     let free = ["belt.stiffness.0", "belt.stiffness.1", "belt.stiffness.2", "belt.stiffness.3"];
     let plan = Plan { free: free.map(String::from).to_vec(), ..Plan::default() };
     let found = fitted(&own, &plan);
@@ -277,10 +278,10 @@ fn spans_of_one_belt_show_by_their_sum() {
 /// that is off by a few periods.
 #[test]
 fn belts_are_found_from_a_stiffness_that_is_far_off() {
-    let truth = case(Kind::CoreXy, &["belt.stiffness=[1.2e5, 1e5, 1.05e5, 0.9e5]"]);
+    let truth = case(MachineKind::CoreXy, &["belt.stiffness=[1.2e5, 1e5, 1.05e5, 0.9e5]"]);
     for start in [0.8e5, 1.3e5, 1.6e5] {
         let begins = format!("belt.stiffness=[{start}, {start}, {start}, {start}]");
-        let own = with_log(case(Kind::CoreXy, &[&begins]), &truth, None, 3);
+        let own = with_log(case(MachineKind::CoreXy, &[&begins]), &truth, None, 3);
         let found = fitted(&own, &belts_of_core_xy(&["bridge.mass", "cart.mass"]));
         for (estimate, value) in found.estimates[2..].iter().zip([1.1e5, 0.975e5]) {
             assert!((estimate.value / value - 1.0).abs() < 2e-3, "{start}: {estimate:?}");
@@ -292,7 +293,7 @@ fn belts_are_found_from_a_stiffness_that_is_far_off() {
 /// gantries, but it is said that one lacks.
 #[test]
 fn what_a_gantry_lacks_is_a_warning() {
-    for kind in [Kind::CoreXy, Kind::HFrame, Kind::DualBelt] {
+    for kind in [MachineKind::CoreXy, MachineKind::HFrame, MachineKind::DualBelt] {
         let truth = case(kind, &["bridge.friction.static=3", "bridge.friction.coulomb_backward=3"]);
         let own = with_log(case(kind, &[]), &truth, None, 5);
         let plan = Plan { free: vec!["bridge.friction.coulomb".into(), "bridge.mass".into()], ..Plan::default() };
@@ -306,8 +307,8 @@ fn what_a_gantry_lacks_is_a_warning() {
 #[test]
 fn a_slow_log_does_not_say_which_belt_is_looser() {
     let slow = "experiment.0.input={ left = { sine = 2, frequency = 2 }, right = { sine = 2, frequency = 3 } }";
-    let truth = case(Kind::CoreXy, &[slow]);
-    let own = with_log(case(Kind::CoreXy, &[slow]), &truth, None, 9);
+    let truth = case(MachineKind::CoreXy, &[slow]);
+    let own = with_log(case(MachineKind::CoreXy, &[slow]), &truth, None, 9);
     let found = fitted(&own, &belts_of_core_xy(&["cart.friction.viscous"]));
     let belts = found.belts().unwrap();
     assert_eq!(belts.looser(), None, "{}", belts.words());
@@ -318,8 +319,8 @@ fn a_slow_log_does_not_say_which_belt_is_looser() {
 #[test]
 fn a_log_that_begins_elsewhere_and_inputs_with_offsets_are_fitted() {
     let begins = "experiment.0.initial={ bridge_position = 0.03, cart_position = -0.02 }";
-    let truth = case(Kind::CoreXy, &[begins]);
-    let mut own = with_log(case(Kind::CoreXy, &[]), &truth, None, 11);
+    let truth = case(MachineKind::CoreXy, &[begins]);
+    let mut own = with_log(case(MachineKind::CoreXy, &[]), &truth, None, 11);
     let log = Arc::make_mut(own.experiments[0].log.as_mut().unwrap());
     log.inputs[0].iter_mut().for_each(|u| *u += 0.05);
     log.inputs[1].iter_mut().for_each(|u| *u -= 0.08);
@@ -339,16 +340,21 @@ fn a_log_that_begins_elsewhere_and_inputs_with_offsets_are_fitted() {
 fn a_single_change_of_a_gantry_is_named() {
     let short = "experiment.0.until=0.15";
     for (kind, changes, name, factor) in [
-        (Kind::CoreXy, "belt.stiffness=[132760, 132760, 106208, 106208]", "belt.stiffness.2 = belt.stiffness.3", 0.8),
         (
-            Kind::DualBelt,
+            MachineKind::CoreXy,
+            "belt.stiffness=[132760, 132760, 106208, 106208]",
+            "belt.stiffness.2 = belt.stiffness.3",
+            0.8,
+        ),
+        (
+            MachineKind::DualBelt,
             "left_drive.motor={ torque_constant = 0.0207, back_emf_constant = 0.0207 }",
             "left_drive.motor.torque_constant = left_drive.motor.back_emf_constant",
             0.9,
         ),
     ] {
         let nominal = match kind {
-            Kind::CoreXy => vec![short, "belt.stiffness=[132760, 132760, 132760, 132760]"],
+            MachineKind::CoreXy => vec![short, "belt.stiffness=[132760, 132760, 132760, 132760]"],
             _ => vec![short],
         };
         let truth = case(kind, &[&nominal[..], &[changes]].concat());
@@ -370,12 +376,12 @@ fn a_single_change_of_a_gantry_is_named() {
 fn friction_laws_of_a_bridge_are_compared() {
     let rows = ["experiment.0.until=0.4"];
     let sided = "bridge.friction={ viscous = 12, coulomb = 1.0, viscous_backward = 16, coulomb_backward = 1.6 }";
-    let truth = case(Kind::CoreXy, &[&rows[..], &[sided]].concat());
-    let case = with_log(case(Kind::CoreXy, &rows), &truth, None, 9);
+    let truth = case(MachineKind::CoreXy, &[&rows[..], &[sided]].concat());
+    let case = with_log(case(MachineKind::CoreXy, &rows), &truth, None, 9);
     let free = ["bridge.friction.viscous", "bridge.friction.coulomb"];
     let plan = Plan { free: free.map(String::from).to_vec(), ..Plan::default() };
     let laws = vec![FrictionLaw::Coulomb, FrictionLaw::Asymmetric];
-    let setting = Setting { laws, windows: vec![None] };
+    let setting = ComparisonOptions { laws, windows: vec![None] };
     let found = compare(&case, "core-xy.toml".as_ref(), &plan, &setting, None, &mut |_| Flow::Continue).unwrap();
     assert_eq!(found.body, "bridge");
     assert_eq!(found.candidates[found.chosen].law, FrictionLaw::Asymmetric, "{:?}", found.words());

@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use taut::case::{Case, Experiment};
 use taut::friction::Friction;
 use taut::linear::{Natural, Operation, Root, System};
-use taut::machine::{Belt, DriveUnit, Kind, Machine, Pulley, Slide, Spans};
+use taut::machine::{Belt, DriveUnit, Machine, MachineKind, Pulley, Slide, Spans};
 use taut::mechanism::{Amplifier, AmplifierMode, Motor, State};
 use taut::signal::Signal;
 use taut::solve::{Ending, Solution, Solver, simulate};
@@ -42,7 +42,7 @@ fn slide(mass: f64) -> impl Strategy<Value = Slide> {
 fn gantry() -> impl Strategy<Value = Machine> {
     let stiffness = || prop::collection::vec(2e4..3e5_f64, 6);
     let damping = prop_oneof![Just(vec![0.0; 6]), prop::collection::vec(0.0..50.0_f64, 6)];
-    let kinds = prop::sample::select(vec![Kind::HFrame, Kind::CoreXy, Kind::DualBelt]);
+    let kinds = prop::sample::select(vec![MachineKind::HFrame, MachineKind::CoreXy, MachineKind::DualBelt]);
     let pulley = (1e-5..2e-4_f64, dry(2e-3, 0.02)).prop_map(|(inertia, friction)| Pulley { inertia, friction });
     (kinds, motor(), 0.005..0.03_f64, pulley, slide(0.8), slide(0.4), stiffness(), damping).prop_map(
         |(kind, motor, pulley_radius, drive_pulley, bridge, cart, mut stiffness, mut damping)| {
@@ -120,9 +120,9 @@ proptest! {
     fn belts_are_closed(gantry in gantry(), x in -0.3..0.3_f64, y in -0.3..0.3_f64) {
         let mechanism = gantry.mechanism();
         let belts: &[&[usize]] = match gantry.kind {
-            Kind::HFrame => &[&[0, 1, 2]],
-            Kind::Axis | Kind::CoreXy => &[&[0, 1], &[2, 3]],
-            Kind::DualBelt => &[&[0, 1], &[2, 3], &[4, 5]],
+            MachineKind::HFrame => &[&[0, 1, 2]],
+            MachineKind::Axis | MachineKind::CoreXy => &[&[0, 1], &[2, 3]],
+            MachineKind::DualBelt => &[&[0, 1], &[2, 3], &[4, 5]],
         };
         for belt in belts {
             let mut sum = [0.0; 5];
@@ -219,23 +219,23 @@ proptest! {
     fn left_and_right_mirror_each_other(gantry in gantry(), inputs in inputs()) {
         let mut mirrored = gantry.clone();
         let order: &[usize] = match gantry.kind {
-            Kind::HFrame => &[1, 0, 2],
-            Kind::Axis | Kind::CoreXy => &[2, 3, 0, 1],
-            Kind::DualBelt => &[2, 3, 0, 1, 4, 5],
+            MachineKind::HFrame => &[1, 0, 2],
+            MachineKind::Axis | MachineKind::CoreXy => &[2, 3, 0, 1],
+            MachineKind::DualBelt => &[2, 3, 0, 1, 4, 5],
         };
         mirrored.belt.stiffness = order.iter().map(|span| gantry.belt.stiffness[*span]).collect();
         mirrored.belt.damping = order.iter().map(|span| gantry.belt.damping[*span]).collect();
         // r φ₁ = −x − y and r φ₂ = x − y: the pulleys of an H-frame turn against each other, those of CoreXY alike.
-        let sign = if gantry.kind == Kind::HFrame { -1.0 } else { 1.0 };
+        let sign = if gantry.kind == MachineKind::HFrame { -1.0 } else { 1.0 };
         let [left, right] = &inputs;
         let exchanged = match gantry.kind {
-            Kind::HFrame => [negative(right), negative(left)],
-            Kind::Axis | Kind::CoreXy | Kind::DualBelt => [right.clone(), left.clone()],
+            MachineKind::HFrame => [negative(right), negative(left)],
+            MachineKind::Axis | MachineKind::CoreXy | MachineKind::DualBelt => [right.clone(), left.clone()],
         };
         let (a, b) = (follow(&gantry, &inputs), follow(&mirrored, &exchanged));
         proportional((&a, "bridge_position"), (&b, "bridge_position"), 1.0, 1e-12)?;
         // The cart of a dual belt has a drive of its own, whose input is another one here.
-        if gantry.kind != Kind::DualBelt {
+        if gantry.kind != MachineKind::DualBelt {
             proportional((&a, "cart_position"), (&b, "cart_position"), -1.0, 1e-12)?;
         }
         proportional((&a, "left_angle"), (&b, "right_angle"), sign, 1e-10)?;
@@ -246,10 +246,10 @@ proptest! {
     fn a_dual_belt_moves_its_bridge_as_a_core_xy_does(gantry in gantry(), inputs in inputs()) {
         let [k, c] = [gantry.belt.stiffness, gantry.belt.damping].map(|all| [all[0], all[1], all[0], all[1]]);
         let unit = gantry.drives[0];
-        let core = Machine { kind: Kind::CoreXy, drives: vec![unit; 2], belt: Belt::given(Spans::from(k), Spans::from(c)), ..gantry.clone() };
+        let core = Machine { kind: MachineKind::CoreXy, drives: vec![unit; 2], belt: Belt::given(Spans::from(k), Spans::from(c)), ..gantry.clone() };
         let six = |of: [f64; 4]| -> Spans { of.into_iter().chain([of[0], of[1]]).collect() };
         let belt = Belt::given(six(k), six(c));
-        let dual = Machine { kind: Kind::DualBelt, drives: vec![unit; 3], belt, ..gantry };
+        let dual = Machine { kind: MachineKind::DualBelt, drives: vec![unit; 3], belt, ..gantry };
         let alike = [inputs[0].clone(), inputs[0].clone()];
         let (a, b) = (follow(&core, &alike), follow(&dual, &alike));
         for column in ["bridge_position", "left_angle", "right_angle"] {
@@ -286,7 +286,7 @@ proptest! {
     /// x and y of an H-frame are coupled through k_l − k_r alone, where nothing sticks.
     #[test]
     fn equal_spans_do_not_couple(gantry in gantry(), volts in 1.0..12.0_f64) {
-        let mut gantry = Machine { kind: Kind::HFrame, ..gantry };
+        let mut gantry = Machine { kind: MachineKind::HFrame, ..gantry };
         gantry.drives.truncate(2);
         gantry.belt.stiffness = [1e5, 1e5, 6e4].into();
         gantry.belt.damping = [3.0, 3.0, 1.0].into();

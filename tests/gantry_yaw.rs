@@ -3,7 +3,7 @@
 use crate::common;
 use taut::case::Case;
 use taut::linear::{Natural, Operation, Root, System};
-use taut::machine::Kind;
+use taut::machine::MachineKind;
 use taut::mechanism::State;
 use taut::metrics::Meter;
 use taut::solve::{ErrorEstimate, Flow, Solution, Solver, simulate};
@@ -84,16 +84,16 @@ impl Plain {
         let (left, right) = (x - half * yaw, x + half * yaw);
         match machine.kind {
             // From the motor up to the bridge's end and along it to the cart; on the far side both ends count.
-            Kind::HFrame => vec![left + y + r * q[0], right - y - r * q[1], -left - right - r * q[0] + r * q[1]],
+            MachineKind::HFrame => vec![left + y + r * q[0], right - y - r * q[1], -left - right - r * q[0] + r * q[1]],
             // From motor A up on the left and to the cart, and round the far end down to the right end and to the cart.
-            Kind::CoreXy => {
+            MachineKind::CoreXy => {
                 vec![-right - y + r * q[0], left + y - r * q[0], -left + y + r * q[1], right - y - r * q[1]]
             }
-            Kind::DualBelt => {
+            MachineKind::DualBelt => {
                 let [a, b, c] = [r * q[0] - left, r * q[1] - right, r * q[2] - y];
                 vec![a, -a, b, -b, c, -c]
             }
-            Kind::Axis => unreachable!(),
+            MachineKind::Axis => unreachable!(),
         }
     }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 use taut::case::{Case, Experiment, TEMPLATE};
 use taut::log::read_columns;
-use taut::machine::{Channel, Encoder, EncoderPlace, Kind, Machine, Measurement, Quantity};
+use taut::machine::{Channel, Encoder, EncoderPlace, Machine, MachineKind, Measurement, Quantity};
 use taut::measure::measure;
 use taut::solve::{Solver, simulate};
 use taut::trajectory::{CsvWriter, Trajectory};
@@ -45,7 +45,7 @@ fn an_ideal_recorder_shows_the_run_to_the_last_bit() {
     setting.0.encoder = None;
     // A recorder has no accelerometer.
     let quantities =
-        Quantity::of(Kind::Axis).iter().copied().filter(|quantity| *quantity != Quantity::CartAcceleration);
+        Quantity::of(MachineKind::Axis).iter().copied().filter(|quantity| *quantity != Quantity::CartAcceleration);
     setting.1.channels = quantities.clone().map(ideal).collect();
     let log = log(&setting);
     assert_eq!(log.len() as u64, setting.2.samples());

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::LazyLock;
 use taut::case::{Case, Given, TEMPLATE, gantry_template};
 use taut::fit::Problem;
-use taut::machine::{Kind, Machine};
+use taut::machine::{Machine, MachineKind};
 use taut::parameter::{self, Field, Free, Off, Parameter, Sits, all, every, free_markdown, kinds, named, values};
 use taut::sweep::Sweep;
 
@@ -409,7 +409,7 @@ fn named_kind(key: &str) -> &'static str {
 #[test]
 fn the_table_is_of_one_piece() {
     let axis = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
-    let text = gantry_template(Kind::CoreXy);
+    let text = gantry_template(MachineKind::CoreXy);
     let gantry = Case::from_text_with("gantry.toml", &text, &[]).unwrap().machine;
     let row = |key: &str| -> &'static Parameter { parameter::find(key).unwrap_or_else(|| panic!("no row {key}")) };
     for parameter in all() {

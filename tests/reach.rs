@@ -17,7 +17,7 @@ use taut::reach::feasible::{loads, shortfalls};
 use taut::signal::Signal;
 use taut::signal::profile::{Profile, Reference};
 use taut::solve::{Solver, simulate};
-use taut_core::calculator::Run;
+use taut_core::calculator::Evaluation;
 
 /// The bounds of a controller with this limit of its command.
 fn commanded(command: Option<f64>) -> Bounds {
@@ -161,7 +161,7 @@ fn what_rounding_leaves_of_a_reference_at_rest_commands_no_friction() {
     let case = Case::read(folder.join("pid-elastic.toml")).unwrap();
     let mut machine = case.machine.clone();
     (machine.drives[0].motor.gear_efficiency, machine.cart.load) = (0.8, 3.0);
-    let run = &mut Run::plain();
+    let run = &mut Evaluation::plain();
     let mut number = 1_u64;
     let mut noise = |size: f64| {
         number = number.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);

@@ -10,20 +10,20 @@ use taut::case::Case;
 use taut::control::compare::compare;
 use taut::control::damping::fitted;
 use taut::control::power_spectral_density;
-use taut::control::shaper::{Corner, Firmware, Form, Kind, Pattern, Shaper, TOLERANCE};
+use taut::control::shaper::{Corner, Firmware, Form, Pattern, Shaper, ShaperKind, TOLERANCE};
 use taut::control::shaping::{ALLOWED_SMOOTHING, Criterion, Target, choose};
 use taut::control::spectrum::{Axis, Spectrum};
 use taut::log::{Accelerometer, read_accelerometer};
 use taut::reach::resonance::{Drive, resonances};
 
-const EXACT: [Kind; 3] = [Kind::Zv, Kind::Mzv, Kind::Zvd];
+const EXACT: [ShaperKind; 3] = [ShaperKind::Zv, ShaperKind::Mzv, ShaperKind::Zvd];
 
-fn shaper(kind: Kind, frequency: f64, damping: f64) -> Shaper {
+fn shaper(kind: ShaperKind, frequency: f64, damping: f64) -> Shaper {
     Shaper::new(kind, frequency, damping).unwrap()
 }
 
-fn any_kind() -> impl Strategy<Value = Kind> {
-    (0..Kind::ALL.len()).prop_map(|i| Kind::ALL[i])
+fn any_kind() -> impl Strategy<Value = ShaperKind> {
+    (0..ShaperKind::ALL.len()).prop_map(|i| ShaperKind::ALL[i])
 }
 
 proptest! {
@@ -43,11 +43,11 @@ proptest! {
     /// Zero where zero is promised; the tolerance of EI without damping, and less with it.
     #[test]
     fn vibration_at_the_design_point(f in 0.1..2000.0, zeta in 0.0..0.9) {
-        for kind in EXACT.into_iter().chain([Kind::TwoHumpEi]) {
+        for kind in EXACT.into_iter().chain([ShaperKind::TwoHumpEi]) {
             let v = shaper(kind, f, zeta).residual_vibration(f, zeta);
             prop_assert!(v < 1e-12, "{:?}: {v}", kind);
         }
-        for kind in [Kind::Ei, Kind::ThreeHumpEi] {
+        for kind in [ShaperKind::Ei, ShaperKind::ThreeHumpEi] {
             let v = shaper(kind, f, zeta).residual_vibration(f, zeta);
             prop_assert!(v <= TOLERANCE + 1e-12, "{:?}: {v}", kind);
             let v = shaper(kind, f, 0.0).residual_vibration(f, 0.0);
@@ -99,7 +99,7 @@ proptest! {
 /// Singhose's EI shapers are those whose humps all reach the tolerance: Chebyshev's polynomials in cos(πx/2).
 #[test]
 fn humps_are_as_high_as_the_tolerance() {
-    for (kind, humps) in [(Kind::Ei, 2), (Kind::TwoHumpEi, 3), (Kind::ThreeHumpEi, 4)] {
+    for (kind, humps) in [(ShaperKind::Ei, 2), (ShaperKind::TwoHumpEi, 3), (ShaperKind::ThreeHumpEi, 4)] {
         let shaper = shaper(kind, 1.0, 0.0);
         let beta = ((1.0 / TOLERANCE).acosh() / f64::from(humps)).cosh();
         for k in 0..=200 {
@@ -116,7 +116,8 @@ fn humps_are_as_high_as_the_tolerance() {
     }
 }
 
-const TODAY: [(Kind, f64); 3] = [(Kind::Ei, 0.4), (Kind::TwoHumpEi, 0.3), (Kind::ThreeHumpEi, 0.2)];
+const TODAY: [(ShaperKind, f64); 3] =
+    [(ShaperKind::Ei, 0.4), (ShaperKind::TwoHumpEi, 0.3), (ShaperKind::ThreeHumpEi, 0.2)];
 
 /// Today's polynomials keep the equations that define EI shapers with damping, to a fifth of the tolerance: humps as
 /// high as the tolerance, between them next to nothing.
@@ -133,11 +134,11 @@ fn humps_are_near_the_tolerance_with_damping() {
             let tops: Vec<f64> = v.windows(3).filter(|w| w[1] > w[0] && w[1] >= w[2]).map(|w| w[1]).collect();
             let bottoms = v.windows(3).filter(|w| w[1] < w[0] && w[1] <= w[2]).map(|w| w[1]);
             let humps = tops.iter().filter(|top| (**top / TOLERANCE - 1.0).abs() < 0.2).count();
-            let wanted = [1, 2, 3][kind as usize - Kind::Ei as usize];
+            let wanted = [1, 2, 3][kind as usize - ShaperKind::Ei as usize];
             assert_eq!(humps, wanted, "{kind:?} {zeta}: {tops:?}");
             assert!(bottoms.fold(0.0, f64::max) < 0.016, "{kind:?} {zeta}");
             let own = shaper.residual_vibration(1.0, zeta);
-            let expected = if kind == Kind::TwoHumpEi { 0.0 } else { TOLERANCE };
+            let expected = if kind == ShaperKind::TwoHumpEi { 0.0 } else { TOLERANCE };
             assert!((own - expected).abs() < 6e-3, "{kind:?} {zeta}: {own}");
         }
     }
@@ -146,7 +147,7 @@ fn humps_are_near_the_tolerance_with_damping() {
 /// Without damping they are what they were, but for the rounding of the polynomials.
 #[test]
 fn without_damping_little_has_changed() {
-    for kind in Kind::ALL {
+    for kind in ShaperKind::ALL {
         let [new, old] = Firmware::ALL.map(|firmware| Shaper::formed(kind.into(), firmware, 40.0, 0.0).unwrap());
         for (a, b) in new.impulses().iter().zip(old.impulses()) {
             let rounding = if EXACT.contains(&kind) { 1e-12 } else { 1e-3 };
@@ -170,14 +171,14 @@ fn generalised_mzv() {
             assert!(shaper.residual_vibration(50.0, zeta) < 1e-12, "{form:?} {zeta}");
         }
     }
-    let usual = Shaper::formed(Kind::Mzv.into(), Firmware::Klipper, 50.0, 0.1).unwrap();
+    let usual = Shaper::formed(ShaperKind::Mzv.into(), Firmware::Klipper, 50.0, 0.1).unwrap();
     let general = Shaper::formed(Form::read("mzv(n=3,t=0.75)").unwrap(), Firmware::Klipper, 50.0, 0.1).unwrap();
     for (a, b) in usual.impulses().iter().zip(general.impulses()) {
         assert!((a.0 - b.0).abs() < 1e-14 && (a.1 - b.1).abs() < 1e-14);
     }
     // Half a period is a ZV: what is between the ends vanishes.
     let short = Shaper::formed(Form::Mzv { pulses: 3, duration: 0.5 }, Firmware::Klipper, 50.0, 0.1).unwrap();
-    let zv = Shaper::formed(Kind::Zv.into(), Firmware::Klipper, 50.0, 0.1).unwrap();
+    let zv = Shaper::formed(ShaperKind::Zv.into(), Firmware::Klipper, 50.0, 0.1).unwrap();
     for (a, b) in short.impulses().iter().zip(zv.impulses()) {
         assert!((a.0 - b.0).abs() < 1e-14 && (a.1 - b.1).abs() < 1e-14, "{short:?}");
     }
@@ -214,7 +215,7 @@ fn wrong_forms_are_told_what_is_wrong_with_them() {
         // A value without a key is no number of one.
         assert!(told == what || text == "mzv(4,0.9)" && told.contains("is no number"), "{text}: {told}");
     }
-    let damped = Pattern::new(Kind::ThreeHumpEi.into(), Firmware::Klipper, 0.25).unwrap_err();
+    let damped = Pattern::new(ShaperKind::ThreeHumpEi.into(), Firmware::Klipper, 0.25).unwrap_err();
     assert!(damped.to_string().contains("3hump_ei for a damping ratio of 0.25"), "{damped}");
     let old = Pattern::new(Form::Ei { tolerance: 0.1 }, Firmware::Klipper202508, 0.1).unwrap_err();
     assert!(old.to_string().contains("klipper-2025-08 has no ei(v_tol=0.1)"), "{old}");
@@ -258,10 +259,10 @@ fn todays_rule() {
     let Some(folder) = spectra() else { return };
     let data = read_accelerometer(&folder.join(PRINTED[0].0)).unwrap();
     let spectrum = Spectrum::by(&data, Axis::All, Firmware::Klipper);
-    let zv_and_mzv = [Form::Usual(Kind::Zv), Form::Usual(Kind::Mzv)];
+    let zv_and_mzv = [Form::Usual(ShaperKind::Zv), Form::Usual(ShaperKind::Mzv)];
     let criterion = Criterion::default().with_forms(&zv_and_mzv);
     let choice = choose(Target::Spectrum(&spectrum), &criterion).unwrap();
-    assert_eq!(choice.best().shaper.kind, Kind::Mzv);
+    assert_eq!(choice.best().shaper.kind, ShaperKind::Mzv);
     let free = choose(Target::Spectrum(&spectrum), &Criterion::default()).unwrap();
     let quiet = Criterion { max_vibrations: Some(0.001), ..Criterion::default() };
     let quiet = choose(Target::Spectrum(&spectrum), &quiet).unwrap();
@@ -302,13 +303,13 @@ type Range = (f64, f64);
 
 /// Klipper's documentation, "Resonance Compensation", Technical details: ranges in % of the shaper's frequency within
 /// which vibration is reduced 20 and 10 times, said to be approximate, for shapers of ζ = 0.1 and machines around that.
-const PUBLISHED: [(Kind, Option<Range>, Range); 6] = [
-    (Kind::Zv, None, (-5.0, 5.0)),
-    (Kind::Mzv, Some((-4.0, 4.0)), (-10.0, 15.0)),
-    (Kind::Zvd, Some((-15.0, 15.0)), (-22.0, 22.0)),
-    (Kind::Ei, Some((-20.0, 20.0)), (-25.0, 25.0)),
-    (Kind::TwoHumpEi, Some((-35.0, 35.0)), (-40.0, 40.0)),
-    (Kind::ThreeHumpEi, Some((-45.0, 50.0)), (-50.0, 55.0)),
+const PUBLISHED: [(ShaperKind, Option<Range>, Range); 6] = [
+    (ShaperKind::Zv, None, (-5.0, 5.0)),
+    (ShaperKind::Mzv, Some((-4.0, 4.0)), (-10.0, 15.0)),
+    (ShaperKind::Zvd, Some((-15.0, 15.0)), (-22.0, 22.0)),
+    (ShaperKind::Ei, Some((-20.0, 20.0)), (-25.0, 25.0)),
+    (ShaperKind::TwoHumpEi, Some((-35.0, 35.0)), (-40.0, 40.0)),
+    (ShaperKind::ThreeHumpEi, Some((-45.0, 50.0)), (-50.0, 55.0)),
 ];
 
 /// The published values lie within the computed ones, and are at most five points of percent less: they were rounded
@@ -371,7 +372,7 @@ fn what_klipper_printed() {
         let criterion = Criterion { firmware: Firmware::Klipper202508, ..Criterion::default() };
         let choice = choose(Target::Spectrum(&spectrum), &criterion).unwrap();
         assert_eq!(choice.best().shaper.kind.name(), recommended, "{file}");
-        let fitted: Vec<_> = choice.fitted.iter().filter(|one| one.shaper.kind != Kind::Zvd).collect();
+        let fitted: Vec<_> = choice.fitted.iter().filter(|one| one.shaper.kind != ShaperKind::Zvd).collect();
         for (one, (frequency, vibration)) in fitted.iter().zip(printed) {
             assert!((one.shaper.frequency - frequency).abs() < 0.2, "{file}: {one:?}");
             assert!((100.0 * one.vibration - vibration).abs() < 0.051, "{file}: {one:?}");
@@ -576,7 +577,7 @@ fn an_authority_agrees() {
     let vibrations = value["vibration"].as_array().unwrap();
     assert!(vibrations.len() >= 60);
     for one in vibrations {
-        let kind = Kind::from_name(one["shaper"].as_str().unwrap()).unwrap();
+        let kind = ShaperKind::from_name(one["shaper"].as_str().unwrap()).unwrap();
         let shaper = shaper(kind, number(&one["frequency"]), number(&one["damping"]));
         let v = shaper.residual_vibration(number(&one["mode_frequency"]), number(&one["mode_damping"]));
         assert!((v - number(&one["vibration"])).abs() < 1e-8, "{one}: {v}");
@@ -613,6 +614,6 @@ fn wrong_files_are_told_what_is_wrong_with_them() {
 fn wrong_numbers_are_refused() {
     for (frequency, damping) in [(0.0, 0.1), (-5.0, 0.1), (f64::NAN, 0.1), (50.0, 1.0), (50.0, -0.1), (50.0, f64::NAN)]
     {
-        assert!(Shaper::new(Kind::Zv, frequency, damping).is_err(), "{frequency} {damping}");
+        assert!(Shaper::new(ShaperKind::Zv, frequency, damping).is_err(), "{frequency} {damping}");
     }
 }

@@ -1,7 +1,7 @@
 //! Input shapers from the modes of a machine, without a measurement: single ones, and pairs.
 
 use taut::case::Case;
-use taut::control::shaper::{Firmware, Kind, Shaper, residual_vibration};
+use taut::control::shaper::{Firmware, Shaper, ShaperKind, residual_vibration};
 use taut::control::shaping::{Criterion, Target, choose};
 use taut::reach::resonance::{Drive, Resonance, reaches, resonances};
 
@@ -21,7 +21,7 @@ fn a_stage_without_a_measurement() {
             let criterion = Criterion::default().with_damping(main.damping).unwrap();
             // Where nothing is uncertain the shortest one does, at the mode's own frequency.
             let sure = choose(Target::Modes { modes: &modes[..1], uncertainty: 0.0 }, &criterion).unwrap();
-            assert_eq!(sure.best().shaper.kind, Kind::Zv);
+            assert_eq!(sure.best().shaper.kind, ShaperKind::Zv);
             assert!((sure.best().shaper.frequency / modes[0].frequency - 1.0).abs() < 0.03, "{sure:?}");
             let choice = choose(Target::Modes { modes: &modes, uncertainty: 0.1 }, &criterion).unwrap();
             let best = &choice.best().shaper;

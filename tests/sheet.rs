@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use taut::case::{Case, TEMPLATE, gantry_template};
 use taut::linear::{Natural, undamped};
 use taut::log::{Log, Output, Quantity, Survey};
-use taut::machine::{BeltModel, Kind, Machine, SimpleDrive, slowest_swing};
+use taut::machine::{BeltModel, Machine, MachineKind, SimpleDrive, slowest_swing};
 use taut::parameter::{Free, set, value};
 use taut::signal::Hold;
 
@@ -64,7 +64,7 @@ fn a_rating_is_met_by_the_motor_that_it_gives() {
 
 #[test]
 fn both_drives_of_a_gantry_take_data_sheets() {
-    let text = gantry_template(Kind::CoreXy);
+    let text = gantry_template(MachineKind::CoreXy);
     let begin = text.find("\n[motor]").unwrap() + 1;
     let end = begin + text[begin..].find("\n[").unwrap();
     let text = format!(
@@ -160,7 +160,7 @@ fn both_ways_to_the_slowest_swing_agree() {
     let mut rigid = common::table4();
     rigid.belt.model = BeltModel::Rigid;
     assert_eq!(slowest_swing(&rigid.mechanism()), None);
-    for kind in [Kind::HFrame, Kind::CoreXy, Kind::DualBelt] {
+    for kind in [MachineKind::HFrame, MachineKind::CoreXy, MachineKind::DualBelt] {
         let gantry = Case::from_text_with("gantry.toml", &gantry_template(kind), &[]).unwrap().machine;
         let hertz = Natural::frequencies(&gantry.mechanism(), &[0.0; 6]).unwrap()[0];
         assert!((slowest_swing(&gantry.mechanism()).unwrap() / (TAU * hertz) - 1.0).abs() < 1e-9);

@@ -345,7 +345,7 @@ fn figures_are_those_of_the_authority() {
         for run in authority["figures"].as_array().unwrap() {
             let (experiment, row) = (run["experiment"].as_str().unwrap(), run["run"].as_u64().unwrap() as usize);
             let figures = run["figures"].as_object().unwrap();
-            for figure in taut::metrics::figures(taut::machine::Kind::Axis, Extras::default()) {
+            for figure in taut::metrics::figures(taut::machine::MachineKind::Axis, Extras::default()) {
                 assert_ne!(figures.contains_key(&figure.name), figure.row.again_on_an_axis, "{}", figure.name);
             }
             for (name, expected) in figures {

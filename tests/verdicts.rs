@@ -8,7 +8,7 @@ use taut::control::feedback::Feedback;
 use taut::control::{Loop, Standard, close};
 use taut::friction::Motion;
 use taut::linear::Operation;
-use taut::machine::Kind;
+use taut::machine::MachineKind;
 use taut::machine::axis::CART;
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::solve::{Event, Solver};
@@ -227,7 +227,7 @@ fn suggested_gains_lead_to_better_ones() {
 /// slowest swing, and gains of a thousandth and less of those of other gantries were suggested.
 #[test]
 fn suggested_gains_of_two_motors_on_a_bridge_move_it() {
-    for kind in [Kind::HFrame, Kind::CoreXy, Kind::DualBelt] {
+    for kind in [MachineKind::HFrame, MachineKind::CoreXy, MachineKind::DualBelt] {
         let case = suggested(&gantry_template(kind), false);
         let design = case.controller.as_ref().unwrap();
         let feedback = Feedback::new(design, &case.machine).unwrap();

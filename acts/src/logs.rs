@@ -8,11 +8,11 @@ use serde_json::{Map, Value, json};
 use std::cell::RefCell;
 use taut::case::{Case, Plan};
 use taut::error::{Error, Result};
-use taut::fit::{Problem, Run, check_watched, fit_watched, profiles};
+use taut::fit::{FittedLog, Problem, check_watched, fit_watched, profiles};
 use taut::log::{ColumnId, Looked, PRESETS, Quantity, look};
-use taut::machine::Kind;
+use taut::machine::MachineKind;
 use taut::solve::{Bench, Flow};
-use taut_report::fit::Found;
+use taut_report::fit::FitResults;
 
 /// Rows and points of a preview.
 const ROWS: usize = 8;
@@ -31,7 +31,7 @@ pub fn columns(request: &Request, context: &Context) -> Result<Reply> {
     let Looked { columns, guess } = look(&file)?;
     let rows = columns.iter().map(|column| column.values.len()).max().unwrap_or(0);
     let thin = rows.div_ceil(POINTS).max(1);
-    let one = |column: &taut::log::Seen| {
+    let one = |column: &taut::log::FileColumn| {
         let values = &column.values;
         json!({
             "id": match &column.id {
@@ -51,7 +51,7 @@ pub fn columns(request: &Request, context: &Context) -> Result<Reply> {
         "found": columns.iter().map(one).collect::<Vec<_>>(),
         "rows": rows,
         "guess": { "preset": guess.preset, "columns": guess.columns.iter().map(keys).collect::<Vec<_>>(), "split": guess.split },
-        "quantities": Quantity::of(Kind::Axis).iter().copied().map(quantity).collect::<Vec<_>>(),
+        "quantities": Quantity::of(MachineKind::Axis).iter().copied().map(quantity).collect::<Vec<_>>(),
         "presets": PRESETS.iter().map(|preset| json!({ "name": preset.name, "title": preset.title })).collect::<Vec<_>>(),
     })))
 }
@@ -116,7 +116,7 @@ pub fn fit(request: &Request, context: &Context) -> Result<Reply> {
         Some(profiles) => profiles?,
         None => Vec::new(),
     };
-    let found = Found { fit, profiles, drawn: None };
+    let found = FitResults { fit, profiles, drawn: None };
     let fit = &found.fit;
     let text = fit.case_text(&case, context.host.name())?;
     let page = taut_report::fit::page(&case, &found, &text);
@@ -137,7 +137,7 @@ pub fn fit(request: &Request, context: &Context) -> Result<Reply> {
 }
 
 /// The text of the page with the estimates in it: its own experiments, not the logs that were fitted.
-fn kept(request: &Request, context: &Context, found: &Found) -> Result<String> {
+fn kept(request: &Request, context: &Context, found: &FitResults) -> Result<String> {
     let own = opened(request, context)?;
     if !own.is_axis() {
         return Err(Error::new("this case is a gantry"));
@@ -151,10 +151,10 @@ struct Live<'a> {
     problem: Problem<'static>,
     /// The places of the logs that are shown.
     shown: Vec<usize>,
-    state: RefCell<Seen>,
+    state: RefCell<FitProgress>,
 }
 
-struct Seen {
+struct FitProgress {
     steps: u64,
     last: Option<f64>,
     bench: Bench,
@@ -166,7 +166,7 @@ impl<'a> Live<'a> {
         // Spread over all of them.
         let count = problem.runs.len().min(SHOWN);
         let shown = (0..count).map(|k| k * (problem.runs.len() - 1) / count.max(2).saturating_sub(1)).collect();
-        let state = RefCell::new(Seen { steps: 0, last: None, bench: Bench::default() });
+        let state = RefCell::new(FitProgress { steps: 0, last: None, bench: Bench::default() });
         Ok(Self { context, problem, shown, state })
     }
 
@@ -196,7 +196,7 @@ impl<'a> Live<'a> {
 
     /// A log and the model's side of it, thinned out.
     fn log(&self, k: usize, x: &[f64], bench: &mut Bench) -> Option<Value> {
-        let run: &Run = &self.problem.runs[k];
+        let run: &FittedLog = &self.problem.runs[k];
         let machine = self.problem.stage_of(run.part, x);
         let extras = self.problem.extras_of(k, x);
         let quantity = run.seen.first()?.quantity;

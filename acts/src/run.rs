@@ -138,7 +138,7 @@ pub fn simulated<'a>(
     solver: Solver,
     context: &Context,
     keep: &mut Keep,
-) -> Result<simulate::Run<'a>> {
+) -> Result<simulate::SimulatedExperiment<'a>> {
     let begun = context.elapsed();
     let machine = &case.machine;
     let mut meter = Meter::new(machine, experiment);
@@ -155,7 +155,7 @@ pub fn simulated<'a>(
     let metrics = meter.finish(&outcome.events);
     let reduction = Reduction::of(machine, experiment, solver)?;
     let took = Duration::try_from_secs_f64(context.elapsed() - begun).unwrap_or_default();
-    Ok(simulate::Run {
+    Ok(simulate::SimulatedExperiment {
         experiment,
         outcome,
         metrics,

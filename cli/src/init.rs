@@ -7,7 +7,7 @@ use crate::terminal;
 use taut::Error;
 use taut::case::{TEMPLATE, Template, gantry_template};
 use taut::files::write_atomically;
-use taut::machine::Kind;
+use taut::machine::MachineKind;
 
 /// Writes the template.
 pub fn run(args: &Init) -> Outcome {
@@ -40,9 +40,9 @@ pub fn run(args: &Init) -> Outcome {
     let text = match (template, args.kind) {
         (Some(template), _) => template.text().to_string(),
         (None, KindName::Axis) => TEMPLATE.to_string(),
-        (None, KindName::HFrame) => gantry_template(Kind::HFrame),
-        (None, KindName::CoreXy) => gantry_template(Kind::CoreXy),
-        (None, KindName::DualBelt) => gantry_template(Kind::DualBelt),
+        (None, KindName::HFrame) => gantry_template(MachineKind::HFrame),
+        (None, KindName::CoreXy) => gantry_template(MachineKind::CoreXy),
+        (None, KindName::DualBelt) => gantry_template(MachineKind::DualBelt),
     };
     write_atomically(file, text).map_err(Failure::work)?;
     let name = quoted(&file.display().to_string());

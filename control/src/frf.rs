@@ -52,7 +52,7 @@ use crate::control::measures_cart;
 use crate::error::{Error, Result};
 use crate::linear::within_travel;
 use crate::log::{Log, Quantity};
-use crate::machine::{EncoderPlace, Kind, Machine};
+use crate::machine::{EncoderPlace, Machine, MachineKind};
 use crate::signal::Hold;
 use nalgebra::Complex;
 use spectra::{Row, Spectra};
@@ -145,12 +145,12 @@ impl Frf {
 
 /// Frequency responses from the log of an axis, one for each signed output.
 pub fn estimate(log: &Log, cut: &Cut) -> Result<Vec<Frf>> {
-    Ok(estimate_all(Kind::Axis, &[log], cut)?.0)
+    Ok(estimate_all(MachineKind::Axis, &[log], cut)?.0)
 }
 
 /// Frequency responses from logs of a machine of this kind, by log, input and output, and warnings. Logs that do not
 /// distinguish all inputs by themselves are combined.
-pub fn estimate_all(kind: Kind, logs: &[&Log], cut: &Cut) -> Result<(Vec<Frf>, Vec<String>)> {
+pub fn estimate_all(kind: MachineKind, logs: &[&Log], cut: &Cut) -> Result<(Vec<Frf>, Vec<String>)> {
     let (mut each, mut rest) = (Vec::new(), Vec::new());
     for log in logs {
         let spectra = Spectra::of(&[*log], cut)?;
@@ -202,7 +202,7 @@ pub fn estimate_all(kind: Kind, logs: &[&Log], cut: &Cut) -> Result<(Vec<Frf>, V
 }
 
 /// Reasons for missing responses to some inputs.
-fn untold(kind: Kind, spectra: &Spectra) -> Vec<Error> {
+fn untold(kind: MachineKind, spectra: &Spectra) -> Vec<Error> {
     let name = |drive: &usize| kind.geometry().drives[*drive].input;
     let listed = |drives: &[usize]| drives.iter().map(name).collect::<Vec<_>>().join(" and ");
     let all = (0..spectra.drives()).filter(|drive| !spectra.tells(*drive));

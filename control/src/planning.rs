@@ -9,7 +9,7 @@ use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
 use crate::metrics::Peak;
 use crate::reach::feasible::{Load, Shortfall, limits, loads, loads_of_run, shortfalls_of_run};
-use crate::reach::quickest::{CLOSELY, INSTANTS, Quickest, Share, Wanted, Way, modes};
+use crate::reach::quickest::{CLOSELY, INSTANTS, MovePath, Quickest, Share, Wanted, modes};
 use crate::signal::profile::{Leg, Limits, Profile};
 use crate::solve::{Ending, Solver};
 use crate::tune::Family;
@@ -181,7 +181,7 @@ struct Ran {
 /// The path of a move and its quickest way.
 struct Search<'a> {
     quickest: Quickest<'a>,
-    way: Way,
+    way: MovePath,
     motion: &'a Move,
 }
 
@@ -199,7 +199,7 @@ struct Planner<'a> {
 impl Planner<'_> {
     fn planned(&self, motion: &Move, place: usize) -> Result<Planned> {
         let impossible = |what: String| Error::new(format!("the move \"{}\": there is no plan: {what}", motion.name));
-        let way = Way::of(&motion.profiles).ok_or_else(|| impossible("it has no stroke".into()))?;
+        let way = MovePath::of(&motion.profiles).ok_or_else(|| impossible("it has no stroke".into()))?;
         let machine = &self.family.machine;
         let mut short = motion.shortfalls(machine, self.design);
         let quickest = Quickest { machine, design: self.design, modes: self.modes, wanted: self.wanted };
@@ -430,7 +430,7 @@ impl Planner<'_> {
     }
 
     /// Minimum time of all legs of the rigid axis, with their rests.
-    fn bound(&self, way: &Way) -> Option<f64> {
+    fn bound(&self, way: &MovePath) -> Option<f64> {
         let [mut from] = way.start[..] else { return None };
         let limits = limits(&self.family.machine, self.design.bounds());
         let rigid = Rigid::of(&self.family.machine);

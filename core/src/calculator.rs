@@ -1,4 +1,4 @@
-//! Arithmetic for control laws. A law is written once; it runs on numbers ([`Run`]), gives its derivatives ([`Slope`]),
+//! Arithmetic for control laws. A law is written once; it runs on numbers ([`Evaluation`]), gives its derivatives ([`Slope`]),
 //! and is exported as a program (`export::program`).
 
 use std::fmt::Debug;
@@ -165,25 +165,25 @@ pub trait Calculator {
 
 /// Evaluation on numbers.
 #[derive(Debug)]
-pub struct Run<'m> {
+pub struct Evaluation<'m> {
     memory: &'m mut [f64],
 }
 
-impl<'m> Run<'m> {
+impl<'m> Evaluation<'m> {
     /// Evaluation with this memory.
     pub fn on(memory: &'m mut [f64]) -> Self {
         Self { memory }
     }
 }
 
-impl Run<'static> {
+impl Evaluation<'static> {
     /// Evaluation of formulas without memory.
     pub fn plain() -> Self {
         Self { memory: &mut [] }
     }
 }
 
-impl Calculator for Run<'_> {
+impl Calculator for Evaluation<'_> {
     type N = f64;
 
     #[inline]

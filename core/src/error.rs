@@ -15,7 +15,7 @@ pub struct Error {
     /// One sentence: the key, its value, and what is wrong with it.
     pub what: String,
     /// Its place in a file, if any.
-    pub place: Option<Place>,
+    pub place: Option<SourceLocation>,
     /// Values that would be accepted.
     pub allowed: Option<String>,
     /// Advice: the next thing to do.
@@ -24,7 +24,7 @@ pub struct Error {
 
 /// A place in a file, or on the command line.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Place {
+pub struct SourceLocation {
     /// The file, as the user named it; or a word such as `--set`.
     pub file: PathBuf,
     /// Line, column and extent within the file, if known. All counted from 1, in characters.
@@ -51,14 +51,14 @@ impl Error {
     }
 
     /// Adds the place.
-    pub fn at(mut self, place: Place) -> Self {
+    pub fn at(mut self, place: SourceLocation) -> Self {
         self.place = Some(place);
         self
     }
 
     /// Adds a file as the place, if no place is known yet.
     pub fn in_file(mut self, file: impl AsRef<Path>) -> Self {
-        self.place.get_or_insert_with(|| Place::file(file));
+        self.place.get_or_insert_with(|| SourceLocation::file(file));
         self
     }
 
@@ -75,7 +75,7 @@ impl Error {
     }
 }
 
-impl Place {
+impl SourceLocation {
     /// A whole file.
     pub fn file(file: impl AsRef<Path>) -> Self {
         Self { file: file.as_ref().to_path_buf(), span: None }

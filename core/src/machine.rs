@@ -16,7 +16,7 @@ use crate::friction::Friction;
 pub use crate::mechanism::{Amplifier, AmplifierMode, GearPlay, Motor, Stepper};
 use crate::polyline::Polyline;
 pub use geometry::{BodyAt, DriveAt, Geometry, Lever, Part, SlideAt, SpanAt};
-pub use kind::Kind;
+pub use kind::MachineKind;
 pub use measured::Quantity;
 pub use sheet::{BELTS, BeltSheet, BeltType, Rating, SimpleDrive, Width};
 pub use spans::Spans;
@@ -25,11 +25,11 @@ pub use swing::slowest_swing;
 
 /// A belt-driven machine: an axis (paper, Fig. 1 and 2), or a gantry with several drives.
 ///
-/// [`Kind`] has its geometry; how many drives, spans and slides there are follows from it.
+/// [`MachineKind`] has its geometry; how many drives, spans and slides there are follows from it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Machine {
     /// The geometry.
-    pub kind: Kind,
+    pub kind: MachineKind,
     /// Drives, in the order of the geometry.
     pub drives: Vec<DriveUnit>,
     /// Pitch radius r of all pulleys, m.
@@ -139,7 +139,7 @@ impl Machine {
     pub(crate) fn beyond_the_paper(&self) -> Option<&'static str> {
         let DriveUnit { motor, amplifier } = &self.drives[0];
         let parts = [
-            (self.kind != Kind::Axis, "a second drive"),
+            (self.kind != MachineKind::Axis, "a second drive"),
             (motor.stepper.is_some(), "a stepper"),
             (amplifier.voltage_limit.is_some(), "a voltage limit"),
             (amplifier.current_limit.is_some(), "a current limit"),

@@ -100,14 +100,14 @@ impl Polyline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calculator::Run;
+    use crate::calculator::Evaluation;
 
     #[test]
     fn lines_between_points_and_held_beyond() {
         let line = Polyline::new(vec![[0.0, 1.0], [0.1, 2.0], [0.2, 0.5]]).unwrap();
         for (x, value) in [(-1.0, 1.0), (0.0, 1.0), (0.05, 1.5), (0.1, 2.0), (0.15, 1.25), (0.2, 0.5), (9.0, 0.5)] {
             assert!((line.value(x) - value).abs() < 1e-15, "{x}");
-            assert_eq!(line.value_by(&mut Run::plain(), x), line.value(x), "{x}");
+            assert_eq!(line.value_by(&mut Evaluation::plain(), x), line.value(x), "{x}");
             assert!((line.shifted(0.3).value(x - 0.3) - value).abs() < 1e-14, "{x}");
             let [begin, end] = line.ends(line.piece_at(x));
             assert!(begin.is_none_or(|begin| begin <= x) && end.is_none_or(|end| x < end), "{x}");

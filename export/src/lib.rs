@@ -19,7 +19,7 @@ mod python;
 mod st;
 mod tables;
 
-pub use place::Place;
+pub use place::Destination;
 pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables, Then};
 
 use crate::case::Case;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Where the files of a target go, and what they are called.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Place {
+pub struct Destination {
     /// The folder.
     pub folder: PathBuf,
     /// True if a file was named and no folder.
@@ -16,7 +16,7 @@ pub struct Place {
     pub stem: String,
 }
 
-impl Place {
+impl Destination {
     /// Place of a path: a file if it ends in `ending`, else a folder with files named `own`.
     pub fn of(path: &Path, ending: &str, own: &str) -> Self {
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();

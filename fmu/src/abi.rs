@@ -1,6 +1,6 @@
 //! Pointers into slices, texts out of pointers, panics into statuses.
 
-use crate::instance::{Instance, Refusal, Status, Told, Use};
+use crate::instance::{Instance, Refusable, Refusal, Status, Use};
 use crate::values::ALIVE;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -63,7 +63,7 @@ impl Handle {
     }
 
     /// A state that was handed out.
-    pub(crate) fn state(&self, state: *mut c_void) -> Told<&Instance> {
+    pub(crate) fn state(&self, state: *mut c_void) -> Refusable<&Instance> {
         match self.states.iter().find(|known| known.cast() == state) {
             // It is in the list, so it was made here and is not freed.
             Some(known) => Ok(unsafe { &**known }),
@@ -72,7 +72,7 @@ impl Handle {
     }
 
     /// Frees a state that was handed out; a null pointer is free already.
-    pub(crate) fn free(&mut self, state: *mut c_void) -> Told<()> {
+    pub(crate) fn free(&mut self, state: *mut c_void) -> Refusable<()> {
         if state.is_null() {
             return Ok(());
         }
@@ -120,7 +120,7 @@ pub(crate) fn tell(log: &Log, environment: *mut c_void, name: &CStr, status: Sta
 /// # Safety
 ///
 /// `instance` is null, or was made by an instantiate function, is not freed, and is in nobody else's hands now.
-pub(crate) unsafe fn with(instance: *mut c_void, act: impl FnOnce(&mut Handle) -> Told<()>) -> c_int {
+pub(crate) unsafe fn with(instance: *mut c_void, act: impl FnOnce(&mut Handle) -> Refusable<()>) -> c_int {
     let Some(handle) = (unsafe { instance.cast::<Handle>().as_mut() }) else { return Status::Error as c_int };
     match catch_unwind(AssertUnwindSafe(|| act(handle))) {
         Ok(Ok(())) => Status::Ok as c_int,
@@ -152,7 +152,7 @@ pub(crate) unsafe fn free(instance: *mut c_void) {
 /// # Safety
 ///
 /// `values` is null or has `count` elements.
-pub(crate) unsafe fn slice<'a, T>(values: *const T, count: usize) -> Told<&'a [T]> {
+pub(crate) unsafe fn slice<'a, T>(values: *const T, count: usize) -> Refusable<&'a [T]> {
     match (values.is_null(), count) {
         (_, 0) => Ok(&[]),
         (true, _) => Err(Refusal::error("a null pointer was given for values")),
@@ -165,7 +165,7 @@ pub(crate) unsafe fn slice<'a, T>(values: *const T, count: usize) -> Told<&'a [T
 /// # Safety
 ///
 /// `values` is null or has room for `count` elements, which nobody else looks at now.
-pub(crate) unsafe fn room<'a, T>(values: *mut T, count: usize) -> Told<&'a mut [T]> {
+pub(crate) unsafe fn room<'a, T>(values: *mut T, count: usize) -> Refusable<&'a mut [T]> {
     match (values.is_null(), count) {
         (_, 0) => Ok(&mut []),
         (true, _) => Err(Refusal::error("a null pointer was given for values")),
@@ -178,7 +178,7 @@ pub(crate) unsafe fn room<'a, T>(values: *mut T, count: usize) -> Told<&'a mut [
 /// # Safety
 ///
 /// `place` is null or can be written to.
-pub(crate) unsafe fn put<T>(place: *mut T, value: T) -> Told<()> {
+pub(crate) unsafe fn put<T>(place: *mut T, value: T) -> Refusable<()> {
     match place.is_null() {
         true => Err(Refusal::error("a null pointer was given for a result")),
         false => {
@@ -227,7 +227,7 @@ pub(crate) fn folder(given: &str) -> PathBuf {
 
 /// Makes an instance of the machine in a folder of resources. Errors: no such machine, or another one than the importer
 /// means.
-fn open(resources: &str, token: &str, purpose: Use) -> Told<Instance> {
+fn open(resources: &str, token: &str, purpose: Use) -> Refusable<Instance> {
     let path = folder(resources).join("machine.toml");
     let text = std::fs::read_to_string(&path).map_err(|e| {
         Refusal::error(format!("{} cannot be read: {e}; allowed: the folder resources of the FMU", path.display()))
@@ -277,7 +277,7 @@ pub(crate) unsafe fn instantiate(
 // --- states that are handed out -------------------------------------------------------------------------------------
 
 /// Keeps a state; one that was handed out before is written over.
-pub(crate) unsafe fn keep(handle: &mut Handle, function: &str, state: *mut *mut c_void) -> Told<()> {
+pub(crate) unsafe fn keep(handle: &mut Handle, function: &str, state: *mut *mut c_void) -> Refusable<()> {
     handle.instance.allow(function, &ALIVE)?;
     let Some(place) = (unsafe { state.as_mut() }) else {
         return Err(Refusal::error("a null pointer was given for a state"));
@@ -293,14 +293,14 @@ pub(crate) unsafe fn keep(handle: &mut Handle, function: &str, state: *mut *mut 
 }
 
 /// Goes on from a state.
-pub(crate) fn bring_back(handle: &mut Handle, function: &str, state: *mut c_void) -> Told<()> {
+pub(crate) fn bring_back(handle: &mut Handle, function: &str, state: *mut c_void) -> Refusable<()> {
     handle.instance.allow(function, &ALIVE)?;
     handle.instance = handle.state(state)?.clone();
     Ok(())
 }
 
 /// Frees a state.
-pub(crate) unsafe fn let_go(handle: &mut Handle, state: *mut *mut c_void) -> Told<()> {
+pub(crate) unsafe fn let_go(handle: &mut Handle, state: *mut *mut c_void) -> Refusable<()> {
     let Some(place) = (unsafe { state.as_mut() }) else { return Ok(()) };
     handle.free(*place)?;
     *place = std::ptr::null_mut();
@@ -308,7 +308,7 @@ pub(crate) unsafe fn let_go(handle: &mut Handle, state: *mut *mut c_void) -> Tol
 }
 
 /// A state as bytes.
-pub(crate) fn write_out(handle: &mut Handle, state: *mut c_void, into: &mut [u8]) -> Told<()> {
+pub(crate) fn write_out(handle: &mut Handle, state: *mut c_void, into: &mut [u8]) -> Refusable<()> {
     let bytes = handle.state(state)?.bytes()?;
     if into.len() < bytes.len() {
         let message = format!("there is room for {} bytes; allowed: {} and more", into.len(), bytes.len());
@@ -319,7 +319,7 @@ pub(crate) fn write_out(handle: &mut Handle, state: *mut c_void, into: &mut [u8]
 }
 
 /// A state of bytes.
-pub(crate) unsafe fn read_in(handle: &mut Handle, bytes: &[u8], state: *mut *mut c_void) -> Told<()> {
+pub(crate) unsafe fn read_in(handle: &mut Handle, bytes: &[u8], state: *mut *mut c_void) -> Refusable<()> {
     let Some(place) = (unsafe { state.as_mut() }) else {
         return Err(Refusal::error("a null pointer was given for a state"));
     };

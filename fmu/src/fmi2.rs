@@ -8,7 +8,7 @@ pub use crate::both::{
     fmi2SerializedFMUstateSize, fmi2SetContinuousStates, fmi2SetFMUstate, fmi2SetTime, fmi2Terminate,
 };
 use crate::instance::Phase::{Continuous, Event, Initialization, Instantiated, Step, Terminated};
-use crate::instance::{Instance, Refusal, Status, Told, Use};
+use crate::instance::{Instance, Refusable, Refusal, Status, Use};
 use crate::step::Halt;
 use crate::values::{ALIVE, READ, SET};
 use std::ffi::{c_char, c_int, c_uint, c_void};
@@ -173,7 +173,7 @@ none_of! {
     fmi2SetString(*const *const c_char);
 }
 
-fn none(instance: &Instance, function: &str, count: usize) -> Told<()> {
+fn none(instance: &Instance, function: &str, count: usize) -> Refusable<()> {
     instance.allow(function, &ALIVE)?;
     match count {
         0 => Ok(()),

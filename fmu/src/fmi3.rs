@@ -10,7 +10,7 @@ pub use crate::both::{
     fmi3Terminate,
 };
 use crate::instance::Phase::{Continuous, Event, Instantiated, Step, Terminated};
-use crate::instance::{Refusal, Status, Told, Use};
+use crate::instance::{Refusable, Refusal, Status, Use};
 use crate::step::Halt;
 use crate::values::{ALIVE, READ, SET};
 use std::ffi::{c_char, c_int, c_void};
@@ -171,7 +171,7 @@ pub unsafe extern "C" fn fmi3ExitConfigurationMode(c: Component) -> c_int {
 // --- values ---------------------------------------------------------------------------------------------------------
 
 /// Refuses as many values as there are no references for: every variable is a number and no array.
-fn alike(references: usize, values: usize) -> Told<()> {
+fn alike(references: usize, values: usize) -> Refusable<()> {
     match references == values {
         true => Ok(()),
         false => {
@@ -271,7 +271,7 @@ none_of! {
     fmi3SetShiftFraction(*const u64, *const u64);
 }
 
-fn none(handle: &mut Handle, function: &str, count: usize) -> Told<()> {
+fn none(handle: &mut Handle, function: &str, count: usize) -> Refusable<()> {
     handle.instance.allow(function, &ALIVE)?;
     match count {
         0 => Ok(()),
@@ -489,7 +489,7 @@ pub unsafe extern "C" fn fmi3DoStep(
 }
 
 /// One part of a step: to its end, or to the next event where somebody wants to know of it.
-fn part(handle: &mut Handle, step: &mut Stepped, call: &mut Option<Call>) -> Told<()> {
+fn part(handle: &mut Handle, step: &mut Stepped, call: &mut Option<Call>) -> Refusable<()> {
     let Use::CoSimulation { events, early } = handle.instance.purpose else { return Ok(()) };
     let hands_over = events && early;
     let update = handle.intermediate;

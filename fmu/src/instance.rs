@@ -44,7 +44,7 @@ impl From<taut_core::Error> for Refusal {
 }
 
 /// The answer of a function.
-pub type Told<T> = Result<T, Refusal>;
+pub type Refusable<T> = Result<T, Refusal>;
 
 /// The purpose of an instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -207,7 +207,7 @@ impl Instance {
     }
 
     /// Refuses a function outside of its phases.
-    pub fn allow(&self, function: &str, phases: &[Phase]) -> Told<()> {
+    pub fn allow(&self, function: &str, phases: &[Phase]) -> Refusable<()> {
         match phases.contains(&self.phase) {
             true => Ok(()),
             false => {
@@ -222,7 +222,7 @@ impl Instance {
     }
 
     /// Refuses a function of the other kind.
-    pub fn only(&self, function: &str, wanted: bool) -> Told<()> {
+    pub fn only(&self, function: &str, wanted: bool) -> Refusable<()> {
         match wanted {
             true => Ok(()),
             false => Err(Refusal::error(format!("{function} is not of this kind of instance"))),
@@ -230,7 +230,7 @@ impl Instance {
     }
 
     /// Refuses a function of model exchange in an instance that is not for it, or outside these phases.
-    pub fn exchanged(&self, function: &str, phases: &[Phase]) -> Told<()> {
+    pub fn exchanged(&self, function: &str, phases: &[Phase]) -> Refusable<()> {
         self.only(function, self.exchanges())?;
         self.allow(function, phases)
     }
@@ -243,7 +243,7 @@ impl Instance {
     // --- from one phase to the next ---------------------------------------------------------------------------------
 
     /// Where it begins and where it must end.
-    pub fn set_up(&mut self, start: f64, stop: Option<f64>) -> Told<()> {
+    pub fn set_up(&mut self, start: f64, stop: Option<f64>) -> Refusable<()> {
         if !start.is_finite() || stop.is_some_and(|stop| stop.is_nan() || stop < start) {
             return Err(Refusal::error(format!(
                 "a run from {start} s to {stop:?} s cannot be; allowed: an end behind the start"
@@ -255,14 +255,14 @@ impl Instance {
     }
 
     /// Its start is found from here on.
-    pub fn enter_initialization(&mut self) -> Told<()> {
+    pub fn enter_initialization(&mut self) -> Refusable<()> {
         self.phase = Phase::Initialization;
         self.columns = None;
         Ok(())
     }
 
     /// Its start is found.
-    pub fn exit_initialization(&mut self) -> Told<()> {
+    pub fn exit_initialization(&mut self) -> Refusable<()> {
         self.prepare()?;
         self.phase = match self.purpose {
             Use::ModelExchange | Use::CoSimulation { events: true, .. } => Phase::Event,
@@ -273,14 +273,14 @@ impl Instance {
     }
 
     /// To another phase, from one of these.
-    pub fn go_into(&mut self, function: &str, from: &[Phase], to: Phase) -> Told<()> {
+    pub fn go_into(&mut self, function: &str, from: &[Phase], to: Phase) -> Refusable<()> {
         self.allow(function, from)?;
         (self.phase, self.columns) = (to, None);
         Ok(())
     }
 
     /// As it was made.
-    pub fn reset(&mut self) -> Told<()> {
+    pub fn reset(&mut self) -> Refusable<()> {
         self.renew();
         Ok(())
     }
@@ -293,7 +293,7 @@ impl Instance {
     // --- the plant --------------------------------------------------------------------------------------------------
 
     /// The mechanism with the present parameters and forces.
-    pub(crate) fn mechanism(&self) -> Told<Mechanism> {
+    pub(crate) fn mechanism(&self) -> Refusable<Mechanism> {
         let mut mechanism = self.model.mechanism(&self.parameters)?;
         for ((index, body), force) in self.model.loads.iter().enumerate().zip(&self.forces) {
             if self.model.force_input(index).is_none() {
@@ -304,7 +304,7 @@ impl Instance {
     }
 
     /// Makes the machine, where there is none with the present numbers.
-    pub(crate) fn prepare(&mut self) -> Told<()> {
+    pub(crate) fn prepare(&mut self) -> Refusable<()> {
         if !matches!(self.plant, Plant::None) {
             return Ok(());
         }
@@ -315,7 +315,7 @@ impl Instance {
     }
 
     /// Makes the machine in its start.
-    pub(crate) fn make(&mut self) -> Told<()> {
+    pub(crate) fn make(&mut self) -> Refusable<()> {
         let mechanism = self.mechanism()?;
         let state = self.model.state(&mechanism, &self.start);
         let design = self.model.design.as_ref();
@@ -371,7 +371,7 @@ impl Instance {
     }
 
     /// Tells the plant its inputs.
-    pub(crate) fn refresh(&mut self) -> Told<()> {
+    pub(crate) fn refresh(&mut self) -> Refusable<()> {
         if !self.is_set {
             return Ok(());
         }
@@ -402,7 +402,7 @@ impl Instance {
     }
 
     /// Goes on with the present numbers of the machine.
-    pub(crate) fn replace(&mut self) -> Told<()> {
+    pub(crate) fn replace(&mut self) -> Refusable<()> {
         let mechanism = self.mechanism()?;
         match &mut self.plant {
             Plant::None => {}

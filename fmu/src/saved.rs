@@ -1,6 +1,6 @@
 //! The state of an instance as bytes, and back.
 
-use crate::instance::{Input, Instance, Phase, Plant, Refusal, Told};
+use crate::instance::{Input, Instance, Phase, Plant, Refusable, Refusal};
 use taut_control::control::Stepped;
 
 /// The first eight of such bytes.
@@ -18,7 +18,7 @@ const PHASES: [Phase; 7] = [
 
 impl Instance {
     /// All of its state. Errors: one whose machine has ended the run.
-    pub fn bytes(&self) -> Told<Vec<u8>> {
+    pub fn bytes(&self) -> Refusable<Vec<u8>> {
         let mut list = vec![MARK, taut_core::chance::hash(self.model.token.bytes()), u64::from(self.exchanges())];
         list.push(PHASES.iter().position(|phase| *phase == self.phase).unwrap_or_default() as u64);
         list.extend([self.is_set, self.is_over, self.stop.is_some(), self.sees_ahead].map(u64::from));
@@ -50,7 +50,7 @@ impl Instance {
     }
 
     /// The state that these bytes are of, as an instance beside this one. Errors: bytes of something else.
-    pub fn of_bytes(&self, bytes: &[u8]) -> Told<Self> {
+    pub fn of_bytes(&self, bytes: &[u8]) -> Refusable<Self> {
         let wrong = || Refusal::error("these bytes are no state of this machine; allowed: what SerializeFMUState gave");
         let words = bytes.chunks_exact(8);
         if !words.remainder().is_empty() {
@@ -75,7 +75,7 @@ impl Instance {
                 _ => return Err(wrong()),
             };
         }
-        let mut numbers = |into: &mut [f64]| -> Told<()> {
+        let mut numbers = |into: &mut [f64]| -> Refusable<()> {
             for number in into {
                 *number = f64::from_bits(next()?);
                 if !number.is_finite() {

@@ -1,6 +1,6 @@
 //! Time goes on: steps of co-simulation, and what an integrator asks of model exchange.
 
-use crate::instance::{Instance, Phase, Plant, Refusal, Status, Told, place};
+use crate::instance::{Instance, Phase, Plant, Refusable, Refusal, Status, place};
 use taut_core::mechanism::Shown;
 use taut_core::signal::profile::Reference;
 use taut_core::solve::{Ending, Event};
@@ -36,7 +36,7 @@ pub struct Settled {
 
 impl Instance {
     /// Where a step from `current` of `size` ends. Errors: a step that is none, or does not begin here.
-    pub fn step_end(&self, current: f64, size: f64) -> Told<f64> {
+    pub fn step_end(&self, current: f64, size: f64) -> Refusable<f64> {
         if !(current.is_finite() && size.is_finite() && size > 0.0) {
             return Err(Refusal::error(format!(
                 "a step of {size} s from {current} s cannot be; allowed: finite times, and a size above zero"
@@ -61,7 +61,7 @@ impl Instance {
     }
 
     /// Goes on to `end`, s, or to the first event where it is to stop there.
-    pub fn go(&mut self, end: f64, stops: bool) -> Told<Halt> {
+    pub fn go(&mut self, end: f64, stops: bool) -> Refusable<Halt> {
         self.prepare()?;
         self.columns = None;
         loop {
@@ -82,7 +82,7 @@ impl Instance {
     }
 
     /// Lets the controller decide, if its time has come and `end` has not.
-    fn decide(&mut self, end: f64) -> Told<()> {
+    fn decide(&mut self, end: f64) -> Refusable<()> {
         while let Some(control) = self.control.as_ref() {
             let at = self.begin + control.next();
             if at > self.time + self.near() || at >= end - self.near() {
@@ -94,7 +94,7 @@ impl Instance {
     }
 
     /// One decision of the controller.
-    fn sample(&mut self) -> Told<()> {
+    fn sample(&mut self) -> Refusable<()> {
         let references = self.referred(Role::Reference);
         let ahead = self.model.lead().map(|_| self.referred(Role::Ahead));
         self.sees_ahead |= ahead.iter().flatten().any(|ahead| *ahead != Reference::default());
@@ -148,7 +148,7 @@ impl Instance {
     }
 
     /// Moves the machine.
-    fn advance(&mut self, end: f64, stops: bool) -> Told<Halt> {
+    fn advance(&mut self, end: f64, stops: bool) -> Refusable<Halt> {
         let until = end - self.begin;
         let Plant::Machine(machine) = &mut self.plant else {
             return Err(Refusal::error("there is no machine to move"));
@@ -201,7 +201,7 @@ impl Instance {
     // --- model exchange ---------------------------------------------------------------------------------------------
 
     /// Puts time in place.
-    pub fn set_time(&mut self, time: f64) -> Told<()> {
+    pub fn set_time(&mut self, time: f64) -> Refusable<()> {
         if !time.is_finite() {
             return Err(Refusal::error(format!("time cannot be {time}; allowed: any finite number")));
         }
@@ -211,7 +211,7 @@ impl Instance {
     }
 
     /// Puts the integrated quantities in place.
-    pub fn set_states(&mut self, values: &[f64]) -> Told<()> {
+    pub fn set_states(&mut self, values: &[f64]) -> Refusable<()> {
         if values.len() != self.quantities.len() {
             return Err(Refusal::error(format!(
                 "{} continuous states cannot be; allowed: {}",
@@ -228,19 +228,19 @@ impl Instance {
     }
 
     /// The integrated quantities.
-    pub fn states(&self, into: &mut [f64]) -> Told<()> {
+    pub fn states(&self, into: &mut [f64]) -> Refusable<()> {
         into.copy_from_slice(self.matching(&self.quantities, into.len())?);
         Ok(())
     }
 
     /// A unit size of each.
-    pub fn nominals(&self, into: &mut [f64]) -> Told<()> {
+    pub fn nominals(&self, into: &mut [f64]) -> Refusable<()> {
         let nominals = self.model.nominals(&self.mechanism()?);
         into.copy_from_slice(self.matching(&nominals, into.len())?);
         Ok(())
     }
 
-    fn matching<'v>(&self, values: &'v [f64], length: usize) -> Told<&'v [f64]> {
+    fn matching<'v>(&self, values: &'v [f64], length: usize) -> Refusable<&'v [f64]> {
         match values.len() == length {
             true => Ok(values),
             false => Err(Refusal::error(format!("{length} values cannot be; allowed: {}", values.len()))),
@@ -248,7 +248,7 @@ impl Instance {
     }
 
     /// Their rates.
-    pub fn rates(&mut self, into: &mut [f64]) -> Told<()> {
+    pub fn rates(&mut self, into: &mut [f64]) -> Refusable<()> {
         let count = self.quantities.len();
         self.prepare()?;
         self.refresh()?;
@@ -260,7 +260,7 @@ impl Instance {
     }
 
     /// The conditions of the mode.
-    pub fn residuals(&mut self, into: &mut [f64]) -> Told<()> {
+    pub fn residuals(&mut self, into: &mut [f64]) -> Refusable<()> {
         let count = self.model.conditions;
         self.prepare()?;
         self.refresh()?;
@@ -272,7 +272,7 @@ impl Instance {
     }
 
     /// True if a condition has fallen by the end of an integrator's step.
-    pub fn has_fallen(&mut self) -> Told<bool> {
+    pub fn has_fallen(&mut self) -> Refusable<bool> {
         self.prepare()?;
         self.refresh()?;
         Ok(match &self.plant {
@@ -282,7 +282,7 @@ impl Instance {
     }
 
     /// Takes up the mode that follows, and lets the controller decide if its time has come.
-    pub fn settle(&mut self) -> Told<Settled> {
+    pub fn settle(&mut self) -> Refusable<Settled> {
         self.prepare()?;
         if !self.exchanges() {
             return Ok(Settled::default());
@@ -313,7 +313,7 @@ impl Instance {
         Ok(settled)
     }
 
-    fn change(&mut self) -> Told<Settled> {
+    fn change(&mut self) -> Refusable<Settled> {
         self.columns = None;
         let Plant::Dynamics(dynamics) = &mut self.plant else { return Ok(Settled::default()) };
         match dynamics.settle(&mut Vec::new()) {

@@ -1,10 +1,10 @@
 //! Variables read and set.
 
-use crate::instance::{Instance, Phase, Plant, Refusal, Told, place};
+use crate::instance::{Instance, Phase, Plant, Refusable, Refusal, place};
 use taut_core::mechanism::{DRIVES, Shown};
 use taut_core::signal::DEGREE;
 use taut_core::solve::{Dynamics, Quantity, Simulator};
-use taut_export::fmu::{Causality, Kind, REFERENCES, Role, Variability, Variable};
+use taut_export::fmu::{Causality, FmiType, REFERENCES, Role, Variability, Variable};
 
 /// Phases in which values can be read.
 pub(crate) const READ: [Phase; 5] =
@@ -22,7 +22,7 @@ pub(crate) const SET: [Phase; 5] =
 const ASIDE: f64 = 1e-6;
 
 impl Instance {
-    fn variable(&self, reference: u32, kind: Kind) -> Told<&Variable> {
+    fn variable(&self, reference: u32, kind: FmiType) -> Refusable<&Variable> {
         match self.model.variable(reference) {
             Some(variable) if variable.kind == kind => Ok(variable),
             Some(variable) => Err(Refusal::error(format!("{} is of another type", variable.name))),
@@ -33,9 +33,9 @@ impl Instance {
     }
 
     /// Real values.
-    pub fn reals(&mut self, references: &[u32], into: &mut [f64]) -> Told<()> {
+    pub fn reals(&mut self, references: &[u32], into: &mut [f64]) -> Refusable<()> {
         for (into, reference) in into.iter_mut().zip(references) {
-            let variable = self.variable(*reference, Kind::Real)?;
+            let variable = self.variable(*reference, FmiType::Real)?;
             let (role, quantity) = (variable.role, variable.quantity);
             // Ways and speeds are not changed by inputs at once, and need none of the other columns.
             let quantity = quantity.map(|index| self.model.quantities[index].0);
@@ -49,15 +49,15 @@ impl Instance {
     }
 
     /// Whole values.
-    pub fn wholes(&mut self, references: &[u32], into: &mut [i32]) -> Told<()> {
+    pub fn wholes(&mut self, references: &[u32], into: &mut [i32]) -> Refusable<()> {
         for (into, reference) in into.iter_mut().zip(references) {
-            let role = self.variable(*reference, Kind::Whole)?.role;
+            let role = self.variable(*reference, FmiType::Whole)?.role;
             *into = self.real(role)? as i32;
         }
         Ok(())
     }
 
-    fn real(&mut self, role: Role) -> Told<f64> {
+    fn real(&mut self, role: Role) -> Refusable<f64> {
         Ok(match role {
             Role::Time => self.time,
             Role::Input(_) | Role::Force(_) | Role::Reference(_) | Role::Ahead(_) => {
@@ -88,7 +88,7 @@ impl Instance {
     }
 
     /// The position of a slide.
-    fn load_position(&mut self, slide: usize) -> Told<f64> {
+    fn load_position(&mut self, slide: usize) -> Refusable<f64> {
         self.prepare()?;
         let load = self.model.loads[slide];
         Ok(match &self.plant {
@@ -101,7 +101,7 @@ impl Instance {
     }
 
     /// The columns of a run now.
-    fn columns(&mut self) -> Told<&[f64]> {
+    fn columns(&mut self) -> Refusable<&[f64]> {
         self.prepare()?;
         if self.columns.is_none() {
             let mut values = Vec::new();
@@ -131,7 +131,7 @@ impl Instance {
     }
 
     /// The integrated quantities now.
-    pub(crate) fn integrated(&mut self) -> Told<Vec<f64>> {
+    pub(crate) fn integrated(&mut self) -> Refusable<Vec<f64>> {
         self.prepare()?;
         let Plant::Machine(machine) = &self.plant else { return Ok(self.quantities.clone()) };
         let state = machine.state();
@@ -157,7 +157,7 @@ impl Instance {
     }
 
     /// The equations of the machine as it stands.
-    pub(crate) fn dynamics(&mut self) -> Told<Dynamics> {
+    pub(crate) fn dynamics(&mut self) -> Refusable<Dynamics> {
         self.prepare()?;
         if let Plant::Dynamics(_) = self.plant {
             self.refresh()?;
@@ -175,11 +175,11 @@ impl Instance {
     }
 
     /// Sets real values: all of them, or none.
-    pub fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Told<()> {
+    pub fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Refusable<()> {
         let mut copy: Option<(Vec<f64>, Vec<f64>)> = None;
         let mut roles = Vec::with_capacity(references.len());
         for (reference, value) in references.iter().zip(values) {
-            let variable = self.variable(*reference, Kind::Real)?;
+            let variable = self.variable(*reference, FmiType::Real)?;
             if !value.is_finite() {
                 return Err(Refusal::error(format!("{} cannot be {value}; allowed: any finite number", variable.name)));
             }
@@ -229,7 +229,7 @@ impl Instance {
     }
 
     /// Refuses what cannot be set now.
-    fn may_set(&self, variable: &Variable) -> Told<()> {
+    fn may_set(&self, variable: &Variable) -> Refusable<()> {
         let before = matches!(self.phase, Phase::Instantiated | Phase::Initialization);
         let may = match variable.role {
             Role::Input(_) | Role::Force(_) | Role::Reference(_) | Role::Ahead(_) => true,
@@ -249,10 +249,10 @@ impl Instance {
     }
 
     /// Derivatives of inputs with respect to time from now on: u(t) = Σ u⁽ᵏ⁾ (t − t₀)ᵏ/k!
-    pub fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Told<()> {
+    pub fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Refusable<()> {
         let mut set = Vec::new();
         for ((reference, order), value) in references.iter().zip(orders).zip(values) {
-            let variable = self.variable(*reference, Kind::Real)?;
+            let variable = self.variable(*reference, FmiType::Real)?;
             let Some(place) = place(&self.model, variable.role) else {
                 return Err(Refusal::error(format!("{} is no input", variable.name)));
             };
@@ -280,11 +280,11 @@ impl Instance {
 
     /// Derivatives of outputs with respect to time, of orders 1 to [`DEGREE`]: exact, those of the present mode.
     /// Errors: what is no output that changes all the time, or a machine whose equations are curved.
-    pub fn output_derivatives(&mut self, references: &[u32], orders: &[i32], into: &mut [f64]) -> Told<()> {
+    pub fn output_derivatives(&mut self, references: &[u32], orders: &[i32], into: &mut [f64]) -> Refusable<()> {
         let mut values: Vec<f64> = Vec::new();
         let machine = self.as_set()?;
         for ((into, reference), order) in into.iter_mut().zip(references).zip(orders) {
-            let variable = self.variable(*reference, Kind::Real)?;
+            let variable = self.variable(*reference, FmiType::Real)?;
             let order = usize::try_from(*order).ok().filter(|order| (1..=DEGREE).contains(order));
             let (Some(order), Causality::Output, Variability::Continuous) =
                 (order, variable.causality(), variable.variability())
@@ -316,7 +316,7 @@ impl Instance {
     }
 
     /// A copy of the machine that has taken the inputs as they are set now.
-    fn as_set(&self) -> Told<Simulator> {
+    fn as_set(&self) -> Refusable<Simulator> {
         let mut copy = self.clone();
         copy.prepare()?;
         copy.refresh()?;
@@ -333,10 +333,10 @@ impl Instance {
 
     /// The change of `unknowns` when `knowns`, inputs or integrated quantities, change as `seed` says, in the present
     /// mode: central differences, to 1e-9 of what the equations of a mode give.
-    pub fn directional(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], into: &mut [f64]) -> Told<()> {
+    pub fn directional(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], into: &mut [f64]) -> Refusable<()> {
         let mut moved = Vec::new();
         for (reference, seed) in knowns.iter().zip(seed) {
-            let variable = self.variable(*reference, Kind::Real)?.clone();
+            let variable = self.variable(*reference, FmiType::Real)?.clone();
             let value = self.real(variable.role)?;
             let is_known =
                 place(&self.model, variable.role).is_some() || (variable.quantity.is_some() && self.exchanges());
@@ -349,15 +349,15 @@ impl Instance {
             moved.push((variable, value, *seed));
         }
         let most = moved.iter().fold(0.0, |most: f64, (_, _, seed)| most.max(seed.abs()));
-        let roles = unknowns.iter().map(|reference| Ok(self.variable(*reference, Kind::Real)?.role));
-        let roles = roles.collect::<Told<Vec<Role>>>()?;
+        let roles = unknowns.iter().map(|reference| Ok(self.variable(*reference, FmiType::Real)?.role));
+        let roles = roles.collect::<Refusable<Vec<Role>>>()?;
         if most == 0.0 {
             into.fill(0.0);
             return Ok(());
         }
         let size = moved.iter().fold(1.0, |size: f64, (_, value, _)| size.max(value.abs()));
         let aside = ASIDE * size / most;
-        let at = |by: f64| -> Told<Vec<f64>> {
+        let at = |by: f64| -> Refusable<Vec<f64>> {
             let mut copy = self.clone();
             for (variable, value, seed) in &moved {
                 match (place(&copy.model, variable.role), variable.quantity) {

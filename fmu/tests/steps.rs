@@ -180,7 +180,7 @@ fn a_state_as_bytes_goes_on_bit_for_bit_in_another_instance() {
             instance.step(0.0731, 0.3);
         }
         for variable in &unit.model.variables {
-            if variable.kind == taut::export::fmu::Kind::Real && variable.name.ends_with("position") {
+            if variable.kind == taut::export::fmu::FmiType::Real && variable.name.ends_with("position") {
                 assert_eq!(one.get(&variable.name), two.get(&variable.name), "{case}: {}", variable.name);
             }
         }

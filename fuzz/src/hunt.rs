@@ -3,7 +3,7 @@
 use crate::bounds::{Taken, Watchdog, measured};
 use crate::mutation::mutated;
 use crate::targets::overwrite;
-use crate::{Kind, Reached, Target};
+use crate::{Reached, Spoiling, Target};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -118,7 +118,7 @@ impl Hunt<'_> {
     fn fail(&mut self, bytes: &[u8], what: &str) {
         let file = self.folder.join(format!("{}-{}.failure", self.target.name, self.report.failures.len()));
         let _ = std::fs::write(&file, bytes);
-        let shown = if self.target.kind == Kind::Text { 2000 } else { 200 };
+        let shown = if self.target.kind == Spoiling::Text { 2000 } else { 200 };
         let begin: String = String::from_utf8_lossy(bytes).chars().take(shown).collect();
         self.report.failures.push(format!("{}: {what}\n  kept in {}\n{begin:?}", self.target.name, file.display()));
     }

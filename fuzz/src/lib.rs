@@ -21,7 +21,7 @@ pub enum Reached {
 
 /// How an input is spoiled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum Spoiling {
     /// By lines, words and numbers.
     Text,
     /// By bytes, lengths and counts.
@@ -46,7 +46,7 @@ pub struct Target {
     /// Its name, also that of its libFuzzer program.
     pub name: &'static str,
     /// How its inputs are spoiled.
-    pub kind: Kind,
+    pub kind: Spoiling,
     /// The words that are put into them.
     pub words: &'static [&'static str],
     /// The reader, and a use of what it reads.
@@ -57,33 +57,33 @@ pub struct Target {
 
 /// All of them.
 pub const TARGETS: [Target; 9] = [
-    Target { name: "case", kind: Kind::Text, words: mutation::TOML, run: targets::case, seeds: corpus::cases },
+    Target { name: "case", kind: Spoiling::Text, words: mutation::TOML, run: targets::case, seeds: corpus::cases },
     Target {
         name: "quantity",
-        kind: Kind::Text,
+        kind: Spoiling::Text,
         words: mutation::UNITS,
         run: targets::quantity,
         seeds: corpus::quantities,
     },
-    Target { name: "csv", kind: Kind::Text, words: mutation::CSV, run: targets::log, seeds: corpus::csv },
-    Target { name: "parquet", kind: Kind::Binary, words: &[], run: targets::log, seeds: corpus::parquet },
-    Target { name: "matlab", kind: Kind::Matlab, words: &[], run: targets::log, seeds: corpus::matlab },
+    Target { name: "csv", kind: Spoiling::Text, words: mutation::CSV, run: targets::log, seeds: corpus::csv },
+    Target { name: "parquet", kind: Spoiling::Binary, words: &[], run: targets::log, seeds: corpus::parquet },
+    Target { name: "matlab", kind: Spoiling::Matlab, words: &[], run: targets::log, seeds: corpus::matlab },
     Target {
         name: "samples",
-        kind: Kind::Text,
+        kind: Spoiling::Text,
         words: mutation::CSV,
         run: targets::accelerometer,
         seeds: corpus::samples,
     },
     Target {
         name: "spectrum",
-        kind: Kind::Text,
+        kind: Spoiling::Text,
         words: mutation::CSV,
         run: targets::accelerometer,
         seeds: corpus::spectra,
     },
-    Target { name: "gcode", kind: Kind::Text, words: mutation::GCODE, run: targets::gcode, seeds: corpus::gcode },
-    Target { name: "draws", kind: Kind::Text, words: mutation::CSV, run: targets::draws, seeds: corpus::draws },
+    Target { name: "gcode", kind: Spoiling::Text, words: mutation::GCODE, run: targets::gcode, seeds: corpus::gcode },
+    Target { name: "draws", kind: Spoiling::Text, words: mutation::CSV, run: targets::draws, seeds: corpus::draws },
 ];
 
 /// The target of that name.

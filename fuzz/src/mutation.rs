@@ -1,6 +1,6 @@
 //! Inputs spoiled: by lines, words and numbers where they are text, by bytes and lengths where they are not.
 
-use crate::{Kind, Seed, Target, corpus};
+use crate::{Seed, Spoiling, Target, corpus};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::Rng;
 use std::ops::Range;
@@ -140,12 +140,12 @@ pub fn mutated(target: &Target, seeds: &[Seed], random: &mut Pcg64) -> Vec<u8> {
         let other = &one(random, seeds).bytes;
         match target.kind {
             // A change of bytes now and then, so that no text is beyond reach.
-            Kind::Text if below(random, 12) > 0 => change_text(&mut bytes, other, target.words, random),
-            Kind::Text | Kind::Binary | Kind::Matlab => change_bytes(&mut bytes, other, random),
+            Spoiling::Text if below(random, 12) > 0 => change_text(&mut bytes, other, target.words, random),
+            Spoiling::Text | Spoiling::Binary | Spoiling::Matlab => change_bytes(&mut bytes, other, random),
         }
         bytes.truncate(LONGEST);
     }
-    if target.kind == Kind::Matlab && below(random, 3) == 0 { corpus::pack(&bytes) } else { bytes }
+    if target.kind == Spoiling::Matlab && below(random, 3) == 0 { corpus::pack(&bytes) } else { bytes }
 }
 
 fn change_bytes(bytes: &mut Vec<u8>, other: &[u8], random: &mut Pcg64) {

@@ -6,7 +6,7 @@ use crate::double::Double;
 use crate::draw::Random;
 use crate::events;
 use crate::machine::{BODIES, Taken};
-use crate::solve::{Ending, Event, Run};
+use crate::solve::{Ending, Event, IndependentRun};
 use crate::subject::{Numbers, Subject};
 use std::panic::catch_unwind;
 
@@ -146,7 +146,7 @@ struct Pair<'a> {
     subject: &'a Subject,
     by: By,
     answer: &'a Answer,
-    known: &'a Run,
+    known: &'a IndependentRun,
 }
 
 impl Pair<'_> {
@@ -195,7 +195,7 @@ impl Pair<'_> {
     }
 
     /// Where bodies do other things than by the independent solver, and that matters.
-    fn disagreement(&self, ours: &[Event], known: &Run) -> Option<String> {
+    fn disagreement(&self, ours: &[Event], known: &IndependentRun) -> Option<String> {
         let end = match known.ending {
             Ending::Complete => self.answer.times.last().copied().unwrap_or(0.0),
             Ending::LeftTravel(time) | Ending::GaveUp(time, _) => time * (1.0 - NEAR),
@@ -248,7 +248,7 @@ impl Pair<'_> {
     }
 
     /// The mistake in how it ended.
-    fn wrong_end(&self, known: &Run) -> Option<String> {
+    fn wrong_end(&self, known: &IndependentRun) -> Option<String> {
         let [until, _] = self.subject.times();
         match (&self.answer.end, &known.ending) {
             (End::Complete, Ending::Complete) => None,
@@ -263,7 +263,7 @@ impl Pair<'_> {
     /// Runs of the independent solver with numbers perturbed by their last bit, or by the tolerance of an integrator;
     /// half of them also keep their state in 64 bits. A controller's clock is off by its last bit. For model exchange,
     /// the conditions of half of them fall later.
-    fn perturbed(&self) -> Vec<Run> {
+    fn perturbed(&self) -> Vec<IndependentRun> {
         let mut runs = Vec::new();
         let (own, of_input) = match (self.by.tolerance(self.subject), self.subject.has_sines()) {
             (Some(tolerance), _) => {

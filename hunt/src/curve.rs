@@ -29,7 +29,7 @@ pub struct Ramp {
 
 /// Kinds of curves.
 #[derive(Debug, Clone)]
-pub enum Kind {
+pub enum CurveKind {
     /// (F_b − F_c) e^{−q²}, or e^{−q}: what a Stribeck curve has beyond F_c.
     Stribeck {
         /// F_b − F_c.
@@ -84,7 +84,7 @@ pub struct Curved {
     /// Factor that changes along the travel.
     pub along: Option<Ramp>,
     /// Its kind.
-    pub kind: Kind,
+    pub kind: CurveKind,
 }
 
 /// y of a tail at a speed and its change over a step, both as multiples of the curve's velocity.
@@ -137,10 +137,10 @@ impl Curved {
     /// A force that it may reach, for judging what is small.
     pub fn scale(&self) -> f64 {
         let size = match &self.kind {
-            Kind::Stribeck { above, .. } => above.high,
-            Kind::Smooth { above, coulomb, .. } => above.high + coulomb.high,
-            Kind::Bristles { velocity, .. } => velocity.high,
-            Kind::Span { .. } => 0.0,
+            CurveKind::Stribeck { above, .. } => above.high,
+            CurveKind::Smooth { above, coulomb, .. } => above.high + coulomb.high,
+            CurveKind::Bristles { velocity, .. } => velocity.high,
+            CurveKind::Span { .. } => 0.0,
         };
         size.abs()
     }
@@ -155,14 +155,14 @@ impl Curved {
             (Some(ramp), k) => ramp.slope * terms[k][ramp.way],
         };
         match &self.kind {
-            Kind::Stribeck { above, velocity, is_gaussian } => {
+            CurveKind::Stribeck { above, velocity, is_gaussian } => {
                 w.q[k] = terms[k][speed] * sign / *velocity;
                 w.y[k] = if *is_gaussian { -product(&w.q, &w.q, k) } else { -w.q[k] };
                 w.e[k] = exponential(&w.e, &w.y, k);
                 w.g[k] = ramp(k);
                 *above * if self.along.is_some() { product(&w.g, &w.e, k) } else { w.e[k] }
             }
-            Kind::Smooth { above, coulomb, velocity } => {
+            CurveKind::Smooth { above, coulomb, velocity } => {
                 w.q[k] = terms[k][speed] * sign / *velocity;
                 w.y[k] = product(&w.q, &w.q, k) * -0.5;
                 w.e[k] = exponential(&w.e, &w.y, k);
@@ -183,7 +183,7 @@ impl Curved {
                 w.g[k] = ramp(k);
                 if self.along.is_some() { product(&w.g, &w.own, k) } else { w.own[k] }
             }
-            Kind::Bristles { above, coulomb, velocity, stiffness, bristle } => {
+            CurveKind::Bristles { above, coulomb, velocity, stiffness, bristle } => {
                 w.q[k] = terms[k][speed] * sign / *velocity;
                 w.y[k] = -product(&w.q, &w.q, k);
                 w.e[k] = exponential(&w.e, &w.y, k);
@@ -194,7 +194,7 @@ impl Curved {
                 w.own[k] = quotient(numerator * *stiffness * sign, &w.own, &w.g, k);
                 w.own[k]
             }
-            Kind::Span { rigidity, length, of, arms } => {
+            CurveKind::Span { rigidity, length, of, arms } => {
                 let start = if k == 0 { *length } else { Double::ZERO };
                 w.g[k] = of.iter().fold(start, |sum, &(place, change)| sum + terms[k][place] * change);
                 let elongation = arms.iter().fold(Double::ZERO, |sum, &(place, arm)| sum + terms[k][place] * arm);
@@ -212,13 +212,13 @@ impl Curved {
     /// Δy ≤ 24 leaves nothing unnoticed, nor does Δy ≤ y/4 with y > 96: e^{−3y/4} is below rounding.
     pub fn part(&self, z: &[Double; PLACES], change: &[f64; PLACES]) -> f64 {
         let (velocity, of_tail): (&Double, Tail) = match &self.kind {
-            Kind::Stribeck { velocity, is_gaussian: false, .. } => (velocity, |q, d| [q, d]),
-            Kind::Stribeck { velocity, .. } | Kind::Bristles { velocity, .. } => {
+            CurveKind::Stribeck { velocity, is_gaussian: false, .. } => (velocity, |q, d| [q, d]),
+            CurveKind::Stribeck { velocity, .. } | CurveKind::Bristles { velocity, .. } => {
                 (velocity, |q, d| [q * q, d * (2.0 * q + d)])
             }
             // The tail of e^{−w²/2} is flatter for w < 40, and e^{−800} is zero.
-            Kind::Smooth { velocity, .. } => (velocity, |w, d| [20.0 * w, 20.0 * d]),
-            Kind::Span { .. } => return 1.0,
+            CurveKind::Smooth { velocity, .. } => (velocity, |w, d| [20.0 * w, 20.0 * d]),
+            CurveKind::Span { .. } => return 1.0,
         };
         let (speed, _) = self.speed;
         let [y, swing] = of_tail(z[speed].high.abs() / velocity.high, change[speed] / velocity.high);
@@ -237,7 +237,7 @@ impl Curved {
         let along = |size: f64| steep.map(|(way, slope)| (way, slope * size));
         let mut slopes = Vec::new();
         match &self.kind {
-            Kind::Stribeck { above, velocity, is_gaussian } => {
+            CurveKind::Stribeck { above, velocity, is_gaussian } => {
                 let (above, q) = (above.high * factor, v / velocity.high);
                 let (e, turn) =
                     if *is_gaussian { ((-q * q).exp(), 2.0 * q.abs()) } else { ((-q).min(700.0).exp(), 1.0) };
@@ -245,11 +245,11 @@ impl Curved {
                 slopes.extend(along(above * e));
                 return (slopes, 16.0 * ROUNDING * above * e);
             }
-            Kind::Smooth { above, coulomb, velocity } => {
+            CurveKind::Smooth { above, coulomb, velocity } => {
                 slopes.push((speed, factor * (1.7 * above.high + 10.0 * coulomb.high) / velocity.high));
                 slopes.extend(along(above.high + coulomb.high));
             }
-            Kind::Bristles { above, coulomb, velocity, stiffness, bristle } => {
+            CurveKind::Bristles { above, coulomb, velocity, stiffness, bristle } => {
                 let q = v / velocity.high;
                 let g = factor * (coulomb.high + above.high * (-q * q).exp());
                 let rate = stiffness.high * v.abs() / g;
@@ -258,7 +258,7 @@ impl Curved {
                 slopes.push((speed, own * (1.0 + 2.0 * q * q * above.high * factor / g)));
                 slopes.extend(along(own * v.abs() / factor));
             }
-            Kind::Span { rigidity, length, of, arms } => {
+            CurveKind::Span { rigidity, length, of, arms } => {
                 let l = of.iter().fold(length.high, |sum, &(place, change)| sum + z[place].high * change);
                 let s = arms.iter().fold(0.0, |sum, &(place, arm)| sum + z[place].high * arm);
                 slopes.extend(arms.iter().map(|&(place, arm)| (place, (arm * rigidity.high / l).abs())));
@@ -306,24 +306,24 @@ mod tests {
         let [above, coulomb, velocity] = [0.4, 1.3, 0.8].map(double);
         let curved = |kind| Curved { place: FRICTION[1], speed: (SPEED[1], 1.0), along: Some(along), kind };
         for is_gaussian in [true, false] {
-            let kind = Kind::Stribeck { above, velocity, is_gaussian };
+            let kind = CurveKind::Stribeck { above, velocity, is_gaussian };
             sums(&curved(kind), |at| {
                 let q = at(SPEED[1]) / velocity;
                 above * a(at) * (if is_gaussian { -(q * q) } else { -q }).exp()
             });
         }
-        sums(&curved(Kind::Smooth { above, coulomb, velocity: double(5.0) }), |at| {
+        sums(&curved(CurveKind::Smooth { above, coulomb, velocity: double(5.0) }), |at| {
             let w = at(SPEED[1]) / double(5.0);
             let hump = double(0.5).exp() * above * w * (w * w * -0.5).exp();
             a(at) * (hump + coulomb * (w * 10.0).tanh())
         });
         let stiffness = double(70.0);
-        sums(&curved(Kind::Bristles { above, coulomb, velocity, stiffness, bristle: BRISTLE[1] }), |at| {
+        sums(&curved(CurveKind::Bristles { above, coulomb, velocity, stiffness, bristle: BRISTLE[1] }), |at| {
             let q = at(SPEED[1]) / velocity;
             let g = a(at) * (coulomb + above * (-(q * q)).exp());
             stiffness * at(SPEED[1]) * at(BRISTLE[1]) / g
         });
-        let kind = Kind::Span {
+        let kind = CurveKind::Span {
             rigidity: double(900.0),
             length: double(1.7),
             of: vec![(WAY[1], -1.0)],
@@ -338,7 +338,7 @@ mod tests {
     #[test]
     fn a_series_of_tanh_is_not_constant_where_tanh_rounds_to_one() {
         let [above, coulomb, velocity] = [0.4, 1.3, 0.8].map(double);
-        let kind = Kind::Smooth { above, coulomb, velocity };
+        let kind = CurveKind::Smooth { above, coulomb, velocity };
         let curved = Curved { place: FRICTION[1], speed: (SPEED[1], 1.0), along: None, kind };
         let mut terms: Terms = [[Double::ZERO; PLACES]; ORDER + 1];
         // 10 w = 45 − 50 s
@@ -364,9 +364,9 @@ mod tests {
     fn steps_do_not_cross_a_curve_from_far_out() {
         let [above, coulomb, velocity] = [0.4, 1.3, 1.0].map(double);
         for (kind, far) in [
-            (Kind::Stribeck { above, velocity, is_gaussian: false }, 300.0),
-            (Kind::Stribeck { above, velocity, is_gaussian: true }, 20.0),
-            (Kind::Smooth { above, coulomb, velocity }, 15.0),
+            (CurveKind::Stribeck { above, velocity, is_gaussian: false }, 300.0),
+            (CurveKind::Stribeck { above, velocity, is_gaussian: true }, 20.0),
+            (CurveKind::Smooth { above, coulomb, velocity }, 15.0),
         ] {
             let curved = Curved { place: FRICTION[1], speed: (SPEED[1], 1.0), along: None, kind };
             let (mut z, mut change) = ([Double::ZERO; PLACES], [0.0; PLACES]);

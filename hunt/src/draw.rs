@@ -15,7 +15,7 @@ use std::fmt::Write;
 
 /// Kinds of stages that are counted by themselves in the table of a hunt.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Kind {
+pub enum StageKind {
     /// Inertias and stiffnesses far apart.
     Wide,
     /// Equal pulleys between equal spans.
@@ -46,42 +46,42 @@ pub enum Kind {
     Far,
 }
 
-impl Kind {
+impl StageKind {
     /// All of them.
-    pub const ALL: [Kind; 14] = [
-        Kind::Wide,
-        Kind::Symmetric,
-        Kind::Reduced,
-        Kind::Static,
-        Kind::Asymmetric,
-        Kind::Inductance,
-        Kind::Current,
-        Kind::Limits,
-        Kind::Losses,
-        Kind::Play,
-        Kind::Slack,
-        Kind::Travel,
-        Kind::Lines,
-        Kind::Far,
+    pub const ALL: [StageKind; 14] = [
+        StageKind::Wide,
+        StageKind::Symmetric,
+        StageKind::Reduced,
+        StageKind::Static,
+        StageKind::Asymmetric,
+        StageKind::Inductance,
+        StageKind::Current,
+        StageKind::Limits,
+        StageKind::Losses,
+        StageKind::Play,
+        StageKind::Slack,
+        StageKind::Travel,
+        StageKind::Lines,
+        StageKind::Far,
     ];
 
     /// Its name.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::Wide => "inertias and stiffnesses over all decades",
-            Kind::Symmetric => "equal pulleys, equal spans 1 and 2",
-            Kind::Reduced => "two-mass and rigid belts",
-            Kind::Static => "static above Coulomb friction",
-            Kind::Asymmetric => "friction that differs by direction",
-            Kind::Inductance => "inductance",
-            Kind::Current => "current mode",
-            Kind::Limits => "limits of voltage and current",
-            Kind::Losses => "gear with losses",
-            Kind::Play => "gear that gives way, backlash",
-            Kind::Slack => "spans that go slack",
-            Kind::Travel => "end stops and ends of the travel",
-            Kind::Lines => "forces along the travel and by speed",
-            Kind::Far => "starts 1 m to 1 km from the origin",
+            StageKind::Wide => "inertias and stiffnesses over all decades",
+            StageKind::Symmetric => "equal pulleys, equal spans 1 and 2",
+            StageKind::Reduced => "two-mass and rigid belts",
+            StageKind::Static => "static above Coulomb friction",
+            StageKind::Asymmetric => "friction that differs by direction",
+            StageKind::Inductance => "inductance",
+            StageKind::Current => "current mode",
+            StageKind::Limits => "limits of voltage and current",
+            StageKind::Losses => "gear with losses",
+            StageKind::Play => "gear that gives way, backlash",
+            StageKind::Slack => "spans that go slack",
+            StageKind::Travel => "end stops and ends of the travel",
+            StageKind::Lines => "forces along the travel and by speed",
+            StageKind::Far => "starts 1 m to 1 km from the origin",
         }
     }
 }
@@ -92,7 +92,7 @@ pub struct Drawn {
     /// The case file.
     pub text: String,
     /// The kinds that it belongs to.
-    pub kinds: Vec<Kind>,
+    pub kinds: Vec<StageKind>,
 }
 
 /// Added to the seed for lines, which are drawn by themselves, and for cases with features.
@@ -162,7 +162,7 @@ struct Draw {
     random: Random,
     /// True if numbers have four digits instead of all.
     short: bool,
-    kinds: Vec<Kind>,
+    kinds: Vec<StageKind>,
     text: String,
     /// Fastest rate so far, 1/s.
     fastest: f64,
@@ -215,7 +215,7 @@ impl Draw {
         self.digits(value)
     }
 
-    fn kind(&mut self, kind: Kind) {
+    fn kind(&mut self, kind: StageKind) {
         if !self.kinds.contains(&kind) {
             self.kinds.push(kind);
         }
@@ -238,7 +238,7 @@ impl Draw {
         let wide = self.random.chance(0.5) && !self.is_by_recipe();
         let (mass, stiffness) = match wide {
             true => {
-                self.kind(Kind::Wide);
+                self.kind(StageKind::Wide);
                 ([0; 3].map(|_| self.decades(1e-3, 1e3)), [0; 3].map(|_| self.decades(1e2, 1e8)))
             }
             false => {
@@ -249,7 +249,7 @@ impl Draw {
         let (mut mass, mut stiffness) = (mass, stiffness);
         let symmetric = self.random.chance(0.15);
         if symmetric {
-            self.kind(Kind::Symmetric);
+            self.kind(StageKind::Symmetric);
             (mass[2], stiffness[1]) = (mass[0], stiffness[0]);
         }
         let damped = self.random.chance(0.5);
@@ -273,7 +273,7 @@ impl Draw {
         let has_spans = [Feature::Slack, Feature::Follows, Feature::HFrame, Feature::CoreXy, Feature::DualBelt];
         let model = if has_spans.into_iter().any(|one| self.wants(one)) { "elastic" } else { model };
         if model != "elastic" {
-            self.kind(Kind::Reduced);
+            self.kind(StageKind::Reduced);
         }
         let [k1, k2, k3] = stiffness;
         let [c1, c2, c3] = damping;

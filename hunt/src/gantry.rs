@@ -10,7 +10,7 @@ use crate::machine::{
     BODIES, CURRENT, Follows, Friction, Model, ROTOR, SPEED, STATES, Span, Taken, WAY, drive, ends, friction, is_strain,
 };
 use taut::case::Experiment;
-use taut::machine::{Kind, Machine};
+use taut::machine::{Machine, MachineKind};
 
 /// Elongation of a span by r φ₁, r φ₂, x, y, and the change of its length with x, y.
 type Row = ([f64; BODIES], [f64; 2]);
@@ -41,15 +41,15 @@ const DUAL_BELT: [Row; 6] = [
 ];
 
 /// The spans, and the changes of r φ of each pulley with x and with y where no span is strained.
-fn frame(kind: Kind) -> (&'static [Row], &'static [[f64; 2]]) {
+fn frame(kind: MachineKind) -> (&'static [Row], &'static [[f64; 2]]) {
     match kind {
         // r φ₁ = −x − y, r φ₂ = x − y
-        Kind::HFrame => (&H_FRAME, &[[-1.0, -1.0], [1.0, -1.0]]),
+        MachineKind::HFrame => (&H_FRAME, &[[-1.0, -1.0], [1.0, -1.0]]),
         // r φ_A = x + y, r φ_B = x − y
-        Kind::CoreXy => (&CORE_XY, &[[1.0, 1.0], [1.0, -1.0]]),
+        MachineKind::CoreXy => (&CORE_XY, &[[1.0, 1.0], [1.0, -1.0]]),
         // r φ₁ = r φ₂ = x, r φ₃ = y
-        Kind::DualBelt => (&DUAL_BELT, &[[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]),
-        Kind::Axis => panic!("an axis has one drive"),
+        MachineKind::DualBelt => (&DUAL_BELT, &[[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]),
+        MachineKind::Axis => panic!("an axis has one drive"),
     }
 }
 

@@ -1,6 +1,6 @@
 //! The states of each part, the equations that follow from them, and the conditions under which they go on.
 
-use crate::curve::{self, Curved, Kind, Ramp};
+use crate::curve::{self, CurveKind, Curved, Ramp};
 use crate::double::Double;
 use crate::machine::{
     BODIES, BRISTLE, CURRENT, Curve, DRIVES, Drive, Ends, Flanks, Line, Model, Play, ROTOR, SPANS, SPEED, STATES,
@@ -408,7 +408,7 @@ impl Builder<'_> {
                     given.map(|(body, &c)| (WAY[body], c)).collect()
                 };
                 let place = curve::SPAN[j];
-                let kind = Kind::Span {
+                let kind = CurveKind::Span {
                     rigidity: follows.rigidity,
                     length: follows.length,
                     of: places(&follows.of),
@@ -446,13 +446,13 @@ impl Builder<'_> {
             + match own.curve {
                 Curve::None => factor(coulomb) * sign(direction),
                 Curve::Stribeck { velocity, is_gaussian } => {
-                    let beyond = curved(Kind::Stribeck { above, velocity, is_gaussian });
+                    let beyond = curved(CurveKind::Stribeck { above, velocity, is_gaussian });
                     (factor(coulomb) + beyond) * sign(direction)
                 }
-                Curve::Smooth(velocity) => curved(Kind::Smooth { above, coulomb, velocity }) * sign(direction),
+                Curve::Smooth(velocity) => curved(CurveKind::Smooth { above, coulomb, velocity }) * sign(direction),
                 Curve::Bristles([stiffness, damping, velocity]) => {
                     let bristle = BRISTLE[body];
-                    let bends = curved(Kind::Bristles { above, coulomb, velocity, stiffness, bristle });
+                    let bends = curved(CurveKind::Bristles { above, coulomb, velocity, stiffness, bristle });
                     Form::state(bristle) * stiffness + (speed(body) - bends) * damping
                 }
             }

@@ -4,7 +4,7 @@
 use crate::double::Double;
 use crate::input::Piece;
 use crate::machine::{Model, ROTOR, Taken, WAY};
-use crate::solve::{Ending, Pieces, Run, Solver};
+use crate::solve::{Ending, IndependentRun, Pieces, Solver};
 use std::f64::consts::PI;
 use taut::case::Case;
 use taut::control::{Controller, Observation, Standard};
@@ -42,7 +42,7 @@ pub fn run(
     own: &Model,
     times: &[f64],
     (clock, kept): (Taken, Option<Taken>),
-) -> Result<Run, String> {
+) -> Result<IndependentRun, String> {
     let design = case.controller.as_ref().ok_or("the case has no controller")?;
     let (machine, profile) = (&case.machine, case.moves[0].profile());
     let end = times.last().copied().unwrap_or(0.0);
@@ -86,7 +86,7 @@ pub fn run(
             Looks::Ahead => profile.at(clock(sample + lead).high),
             Looks::OnFromSample => later(&reference, lead),
         };
-        let given = law.step(&Seen { time: sample, reference, ahead, position, scale, current });
+        let given = law.step(&LoopInputs { time: sample, reference, ahead, position, scale, current });
         // A delay of whole samples ends at a sample, to the last bit: its command acts from behind that one on.
         let at = if (delay / every - whole).abs() < 1e-9 { (f64::from(k) + whole) * every } else { sample + delay };
         // Before the delay is over nothing is commanded.
@@ -132,7 +132,7 @@ fn in_counts(value: f64, counts: f64) -> f64 {
 }
 
 /// Inputs of a controller at a sample.
-struct Seen {
+struct LoopInputs {
     time: f64,
     reference: Reference,
     ahead: Reference,
@@ -143,7 +143,7 @@ struct Seen {
 
 /// A controller under way.
 struct Law {
-    structure: Kind,
+    structure: LoopKind,
     every: f64,
     limit: Option<f64>,
     feed: Option<Rigid>,
@@ -156,7 +156,7 @@ struct Law {
     of_current: f64,
 }
 
-enum Kind {
+enum LoopKind {
     Pid(Pid),
     Cascade(Cascade),
     Sliding(SlidingMode, f64, f64),
@@ -173,10 +173,10 @@ impl Law {
             && design.feed_forward.model != FeedForwardModel::Elastic
             && !design.feed_forward.compensate_stretch;
         let structure = match &design.structure {
-            Structure::Pid(pid) if own => Kind::Pid(*pid),
-            Structure::Cascade(cascade) if own => Kind::Cascade(*cascade),
-            Structure::SlidingMode(sliding) if own => Kind::Sliding(*sliding, rigid.mass, rigid.push),
-            Structure::Fuzzy(fuzzy) if own => Kind::Fuzzy(fuzzy.clone()),
+            Structure::Pid(pid) if own => LoopKind::Pid(*pid),
+            Structure::Cascade(cascade) if own => LoopKind::Cascade(*cascade),
+            Structure::SlidingMode(sliding) if own => LoopKind::Sliding(*sliding, rigid.mass, rigid.push),
+            Structure::Fuzzy(fuzzy) if own => LoopKind::Fuzzy(fuzzy.clone()),
             Structure::Pid(_)
             | Structure::Cascade(_)
             | Structure::SlidingMode(_)
@@ -185,7 +185,7 @@ impl Law {
             | Structure::StateFeedback(_) => {
                 let mut standard = Standard::new(design, machine).map_err(|error| error.to_string())?;
                 standard.reset();
-                Kind::Borrowed(Box::new(standard))
+                LoopKind::Borrowed(Box::new(standard))
             }
         };
         let feed = (design.feed_forward.model == FeedForwardModel::Rigid).then_some(Rigid {
@@ -217,7 +217,7 @@ impl Law {
     }
 
     /// The command that is given.
-    fn step(&mut self, seen: &Seen) -> f64 {
+    fn step(&mut self, seen: &LoopInputs) -> f64 {
         let t = self.every;
         let y = &seen.reference;
         let clip = |asked: f64| {
@@ -226,8 +226,8 @@ impl Law {
         };
         let limit = self.limit;
         let added = match &self.structure {
-            Kind::Borrowed(_) => 0.0,
-            Kind::Pid(_) | Kind::Cascade(_) | Kind::Sliding(..) | Kind::Fuzzy(_) => {
+            LoopKind::Borrowed(_) => 0.0,
+            LoopKind::Pid(_) | LoopKind::Cascade(_) | LoopKind::Sliding(..) | LoopKind::Fuzzy(_) => {
                 self.feed.as_ref().map_or(0.0, |rigid| rigid.command(&seen.ahead))
             }
         };
@@ -237,14 +237,14 @@ impl Law {
         };
         let e = y.position - seen.position;
         match &mut self.structure {
-            Kind::Borrowed(standard) => {
-                let &Seen { time, reference, ahead, position, scale, current } = seen;
+            LoopKind::Borrowed(standard) => {
+                let &LoopInputs { time, reference, ahead, position, scale, current } = seen;
                 let asked = standard.step(&Observation { time, reference, ahead, position, scale, current });
                 let given = clip(asked);
                 standard.limited(given);
                 given
             }
-            Kind::Pid(pid) => {
+            LoopKind::Pid(pid) => {
                 let pid = *pid;
                 let tau = 1.0 / (2.0 * PI * pid.filter);
                 let change = e - self.last_error.unwrap_or(e);
@@ -258,7 +258,7 @@ impl Law {
                 }
                 given
             }
-            Kind::Cascade(cascade) => {
+            LoopKind::Cascade(cascade) => {
                 let cascade = *cascade;
                 let v = self.speed(seen.position, cascade.filter);
                 let e = seen.scale.map_or(e, |scale| y.position - scale);
@@ -292,7 +292,7 @@ impl Law {
                 }
                 given
             }
-            Kind::Sliding(sliding, mass, push) => {
+            LoopKind::Sliding(sliding, mass, push) => {
                 let (sliding, mass, push) = (*sliding, *mass, *push);
                 let rate = y.speed - self.speed(seen.position, sliding.filter);
                 self.integral += t * e;
@@ -308,7 +308,7 @@ impl Law {
                 }
                 given
             }
-            Kind::Fuzzy(fuzzy) => {
+            LoopKind::Fuzzy(fuzzy) => {
                 let fuzzy = fuzzy.clone();
                 let rate = y.speed - self.speed(seen.position, fuzzy.filter);
                 let rule = between(&fuzzy.rules, e / fuzzy.error, rate / fuzzy.rate);

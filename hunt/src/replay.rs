@@ -103,7 +103,7 @@ struct Change {
 
 /// The changes of each element, and to when they are known.
 #[derive(Debug, Clone, Default)]
-struct Told {
+struct ElementChanges {
     changes: Vec<Vec<Change>>,
     end: f64,
 }
@@ -155,7 +155,7 @@ impl Drawn {
     }
 
     /// Changes of the parts by the exact solver, all commands multiplied by a factor.
-    fn by_taut(&self, factor: f64) -> Option<Told> {
+    fn by_taut(&self, factor: f64) -> Option<ElementChanges> {
         let mut machine = Simulator::of_mechanism(&self.mechanism, &State::default(), Solver::Exact, self.step).ok()?;
         let mut events = Vec::new();
         let mut end = self.until();
@@ -179,22 +179,22 @@ impl Drawn {
             let own = events.iter().filter(|event| element.kind.what() == Some(event.part.what));
             own.map(|event| Change { time: event.time, code: event.to.code() }).collect()
         });
-        Some(Told { changes: changes.collect(), end })
+        Some(ElementChanges { changes: changes.collect(), end })
     }
 
     /// Changes of elements in words of the tables, as events have them.
-    fn told(&self, raw: &[(f64, usize, usize)]) -> Told {
+    fn told(&self, raw: &[(f64, usize, usize)]) -> ElementChanges {
         let mut changes = vec![Vec::new(); self.tables.elements.len()];
         for &(time, element, state) in raw {
             if let Some(does) = self.tables.elements.get(element).and_then(|element| element.states.get(state)) {
                 changes[element].push(Change { time, code: Tables::shown_code(*does) });
             }
         }
-        Told { changes, end: self.until() }
+        ElementChanges { changes, end: self.until() }
     }
 
     /// The changes of an element that show, up to `end`: those that last, and after which it does something else.
-    fn lasting(&self, told: &Told, element: usize, end: f64) -> Vec<Change> {
+    fn lasting(&self, told: &ElementChanges, element: usize, end: f64) -> Vec<Change> {
         let part = &self.tables.elements[element];
         let mut now = Tables::shown_code(part.states[self.tables.at_rest()[element]]);
         let moment = MOMENT * self.until();
@@ -211,7 +211,7 @@ impl Drawn {
     }
 
     /// The first time at which two lists are not the same: which element.
-    fn parting(&self, a: &Told, b: &Told) -> Option<(f64, usize)> {
+    fn parting(&self, a: &ElementChanges, b: &ElementChanges) -> Option<(f64, usize)> {
         let (end, near) = (a.end.min(b.end), NEAR * self.until());
         let shown = |&element: &usize| self.tables.elements[element].kind.what().is_some();
         let of_element = |element: usize| {
@@ -227,7 +227,7 @@ impl Drawn {
     }
 
     /// To when the changes are the same for commands that differ by this share.
-    fn determined(&self, told: &Told, share: f64) -> f64 {
+    fn determined(&self, told: &ElementChanges, share: f64) -> f64 {
         [1.0 + share, 1.0 - share].into_iter().fold(told.end, |end, factor| match self.by_taut(factor) {
             Some(other) => self.parting(told, &other).map_or(end.min(other.end), |(time, _)| end.min(time)),
             None => 0.0,
@@ -235,9 +235,9 @@ impl Drawn {
     }
 
     /// Compares what a tool says with what taut does.
-    fn compare(&self, tool: Tool, own: &Told, other: Told, result: &mut Replayed) {
+    fn compare(&self, tool: Tool, own: &ElementChanges, other: ElementChanges, result: &mut Replayed) {
         let end = self.determined(own, tool.error());
-        let own = Told { end, ..own.clone() };
+        let own = ElementChanges { end, ..own.clone() };
         let shown = (0..self.tables.elements.len()).filter(|&e| self.tables.elements[e].kind.what().is_some());
         for element in shown {
             result.compared += self.lasting(&own, element, end).len();
@@ -245,7 +245,7 @@ impl Drawn {
         }
         result.machines += 1;
         if let Some((time, element)) = self.parting(&own, &other) {
-            let near = |told: &Told| {
+            let near = |told: &ElementChanges| {
                 let all = self.lasting(told, element, f64::MAX).into_iter();
                 let near = all.filter(|change| (change.time - time).abs() <= 0.05 * self.until());
                 near.map(|change| format!("{} at {:e} s", change.code, change.time)).collect::<Vec<_>>().join(", ")
@@ -283,8 +283,8 @@ fn held(values: &[f64], random: &mut Random) -> Vec<f64> {
 /// Replays the machines by a tool. Errors: a tool that does not run at all.
 pub fn replay(tool: Tool, program: &Path, machines: &[Drawn]) -> Result<Replayed, String> {
     let mut result = Replayed::default();
-    let own: Vec<Option<Told>> = machines.iter().map(|machine| machine.by_taut(1.0)).collect();
-    let known: Vec<(&Drawn, Told)> =
+    let own: Vec<Option<ElementChanges>> = machines.iter().map(|machine| machine.by_taut(1.0)).collect();
+    let known: Vec<(&Drawn, ElementChanges)> =
         machines.iter().zip(own).filter_map(|(machine, own)| Some((machine, own?))).collect();
     let folder = Folder::new()?;
     let raw = match tool {
@@ -378,7 +378,7 @@ for name, step, commands in MACHINES:
         print('refused', why)
 ";
 
-fn in_python(folder: &Folder, python: &Path, known: &[(&Drawn, Told)]) -> Result<Vec<Raw>, String> {
+fn in_python(folder: &Folder, python: &Path, known: &[(&Drawn, ElementChanges)]) -> Result<Vec<Raw>, String> {
     let mut commands = String::from("MACHINES = [\n");
     for (machine, _) in known {
         let name = format!("m{}", machine.number);
@@ -405,7 +405,7 @@ fn parted(told: &str) -> Vec<Raw> {
     parts.map(|part| (!part.contains("refused")).then(|| part.lines().filter_map(line).collect())).collect()
 }
 
-fn in_octave(folder: &Folder, octave: &Path, known: &[(&Drawn, Told)]) -> Result<Vec<Raw>, String> {
+fn in_octave(folder: &Folder, octave: &Path, known: &[(&Drawn, ElementChanges)]) -> Result<Vec<Raw>, String> {
     let mut main = String::from("1;\n");
     for (machine, own) in known {
         let name = format!("m{}", machine.number);

@@ -49,7 +49,7 @@ pub enum Ending {
 
 /// A run.
 #[derive(Debug, Clone)]
-pub struct Run {
+pub struct IndependentRun {
     /// Positions along the belt less those of the start, m, at the times asked for, as far as it went.
     pub rows: Vec<[Double; BODIES]>,
     /// Changes of bodies.
@@ -65,7 +65,7 @@ pub type Pieces = [Piece; DRIVES];
 
 /// Runs a machine under these chains of inputs, a chain for each drive, and gives the positions at `times`, which grow.
 /// `kept` rounds the state after each step, as if it were kept in fewer bits.
-pub fn run(machine: &Model, chains: &[Vec<Piece>], times: &[f64], kept: Option<Taken>) -> Run {
+pub fn run(machine: &Model, chains: &[Vec<Piece>], times: &[f64], kept: Option<Taken>) -> IndependentRun {
     let end = times.last().copied().unwrap_or(0.0);
     let mut solver = Solver::new(machine, times, kept);
     let mut starts: Vec<Double> = chains.iter().flatten().map(|piece| piece.start).collect();
@@ -180,9 +180,9 @@ impl<'a, 'b> Solver<'a, 'b> {
     }
 
     /// The run so far.
-    pub fn finish(mut self) -> Run {
+    pub fn finish(mut self) -> IndependentRun {
         self.record_up_to(self.time, None);
-        Run { rows: self.rows, events: self.events, ending: self.ending, steps: self.steps }
+        IndependentRun { rows: self.rows, events: self.events, ending: self.ending, steps: self.steps }
     }
 
     fn prepared(&mut self) -> Rc<Prepared> {

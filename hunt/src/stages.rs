@@ -2,7 +2,7 @@
 
 use crate::by::By;
 use crate::compare::{Compared, Verdict, compare};
-use crate::draw::{self, Drawn, Feature, Kind};
+use crate::draw::{self, Drawn, Feature, StageKind};
 use serde_json::{Value, json};
 use std::fmt::Write;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -53,7 +53,7 @@ pub struct Outcome {
     /// Its case file.
     pub text: String,
     /// The kinds that it belongs to.
-    pub kinds: Vec<Kind>,
+    pub kinds: Vec<StageKind>,
     /// The features of its recipe.
     pub features: Vec<Feature>,
     /// The answers of the solvers.
@@ -253,7 +253,7 @@ impl Line {
 
 fn lines(outcomes: &[Outcome]) -> Vec<Line> {
     let by = |by: By| move |outcome: &'_ Outcome| outcome.compared.iter().find(|compared| compared.by == by).cloned();
-    let all = |solver: By, kind: Option<Kind>| -> Vec<Compared> {
+    let all = |solver: By, kind: Option<StageKind>| -> Vec<Compared> {
         let of_kind = outcomes.iter().filter(|outcome| kind.is_none_or(|kind| outcome.kinds.contains(&kind)));
         of_kind.filter_map(by(solver)).collect()
     };
@@ -266,7 +266,7 @@ fn lines(outcomes: &[Outcome]) -> Vec<Line> {
         return std::iter::once(whole).chain(Feature::ALL.map(of_feature)).collect();
     }
     let mut lines = vec![Line::of("all", all(By::Exact, None).iter())];
-    lines.extend(Kind::ALL.map(|kind| Line::of(kind.name(), all(By::Exact, Some(kind)).iter())));
+    lines.extend(StageKind::ALL.map(|kind| Line::of(kind.name(), all(By::Exact, Some(kind)).iter())));
     lines.push(Line::of("all, by the general solver", all(By::General, None).iter()));
     lines
 }

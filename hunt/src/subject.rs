@@ -4,9 +4,9 @@ use crate::double::Double;
 use crate::input::{self, Piece};
 use crate::loops::{self, Looks};
 use crate::machine::{BODIES, Model, Taken};
-use crate::solve::{self, Run};
+use crate::solve::{self, IndependentRun};
 use taut::case::{Case, Experiment, Move};
-use taut::machine::{Kind, Machine};
+use taut::machine::{Machine, MachineKind};
 use taut::signal::Signal;
 
 /// The subject of a run.
@@ -86,7 +86,7 @@ impl Subject {
     /// Names of its bodies.
     pub fn names(&self) -> &'static [&'static str] {
         match self {
-            Subject::Gantry(case) if case.machine.kind == Kind::DualBelt => {
+            Subject::Gantry(case) if case.machine.kind == MachineKind::DualBelt => {
                 &["left pulley", "right pulley", "cart pulley", "bridge", "cart"]
             }
             Subject::Axis(_) | Subject::Loop(_) => &["drive pulley", "cart", "idler pulley"],
@@ -97,7 +97,7 @@ impl Subject {
     /// Names of the columns that hold their positions.
     pub fn columns(&self) -> &'static [&'static str] {
         match self {
-            Subject::Gantry(case) if case.machine.kind == Kind::DualBelt => {
+            Subject::Gantry(case) if case.machine.kind == MachineKind::DualBelt => {
                 &["left_angle", "right_angle", "cart_pulley_angle", "bridge_position", "cart_position"]
             }
             Subject::Axis(_) | Subject::Loop(_) => &["drive_angle", "cart_position", "idler_angle"],
@@ -142,7 +142,7 @@ impl Subject {
     }
 
     /// The independent solver's run with rows at `times`.
-    pub fn known(&self, fed: &Fed, times: &[f64], numbers: Numbers) -> Result<Run, String> {
+    pub fn known(&self, fed: &Fed, times: &[f64], numbers: Numbers) -> Result<IndependentRun, String> {
         let machine = Model { delayed: numbers.delayed, ..self.machine(numbers.machine) };
         let end = times.last().copied().unwrap_or(0.0);
         if let Subject::Loop(case) = self {
@@ -158,7 +158,7 @@ impl Subject {
     }
 
     /// The same with all numbers as they are.
-    pub fn known_as_is(&self, fed: &Fed, times: &[f64]) -> Result<Run, String> {
+    pub fn known_as_is(&self, fed: &Fed, times: &[f64]) -> Result<IndependentRun, String> {
         let numbers = Numbers {
             machine: &mut Double::from,
             input: &mut Double::from,

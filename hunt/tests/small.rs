@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use taut_hunt::by::{self, By};
 use taut_hunt::compare::Verdict;
-use taut_hunt::draw::{self, Feature, Kind};
+use taut_hunt::draw::{self, Feature, StageKind};
 use taut_hunt::machine::BODIES;
 use taut_hunt::stages::{self, Drawing, Hunt, Outcome};
 use taut_hunt::subject::Subject;
@@ -116,7 +116,7 @@ fn a_move_that_reads_another_count_states_it() {
 
 #[test]
 fn every_kind_of_stage_is_drawn() {
-    for kind in Kind::ALL {
+    for kind in StageKind::ALL {
         let count = (0..200).filter(|&number| draw::stage(1, number).kinds.contains(&kind)).count();
         assert!(count >= 10, "{}: {count}", kind.name());
     }

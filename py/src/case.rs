@@ -12,11 +12,11 @@ use std::sync::Arc;
 use taut::Error;
 use taut::case::{Files, InputFile, Plan, TEMPLATE};
 use taut::control::Added;
-use taut::export::{Exported, Options, Part, Place, Real, Target, export};
+use taut::export::{Destination, Exported, Options, Part, Real, Target, export};
 use taut::files::{Inputs, write_atomically};
 use taut::fit::Effort;
-use taut::fit::compare::{FrictionLaw, Setting, compare};
-use taut::fit::experiment_design::{Criterion, Kind, Request, design, verify};
+use taut::fit::compare::{ComparisonOptions, FrictionLaw, compare};
+use taut::fit::experiment_design::{Criterion, Excitation, Request, design, verify};
 use taut::fit::map::map;
 use taut::fit::{Posterior, Profile, check_watched, drift, fit, posterior, profiles};
 use taut::frf::{Cut, Known, measure};
@@ -27,7 +27,7 @@ use taut::machine::Channel;
 use taut::overview::Overview;
 use taut::planning::plan;
 use taut::reach::quickest::Wanted;
-use taut::solve::{Choice, Flow, Kind as SolverKind, Method};
+use taut::solve::{Choice, Flow, Method, SolverKind};
 use taut::tune::{evaluate, tune};
 
 /// Draws that tune a chain.
@@ -249,8 +249,8 @@ impl Case {
     ) -> PyResult<(Py<PyAny>, Py<Self>)> {
         let case = &self.inner;
         let kind = |word: &String| {
-            let kinds = Kind::ALL.map(Kind::word).join(", ");
-            let found = Kind::ALL.into_iter().find(|kind| kind.word() == word);
+            let kinds = Excitation::ALL.map(Excitation::word).join(", ");
+            let found = Excitation::ALL.into_iter().find(|kind| kind.word() == word);
             found.ok_or_else(|| Error::new(format!("there is no input \"{word}\"")).allowed(kinds))
         };
         let channel = |(name, noise): &(String, f64)| {
@@ -401,7 +401,7 @@ impl Case {
     ) -> PyResult<(Py<PyAny>, Py<Self>)> {
         let case = &self.inner;
         let plan = case.fit_plan(&self.path).told(py)?;
-        let mut setting = Setting::usual(case, &plan);
+        let mut setting = ComparisonOptions::usual(case, &plan);
         if !laws.is_empty() {
             setting.laws = laws.iter().map(|law| FrictionLaw::named(law)).collect::<taut::Result<_>>().told(py)?;
         }
@@ -475,7 +475,7 @@ impl Case {
         let made = unlocked(py, || {
             let inputs = inputs(&opened.files);
             let text = |target: Target| {
-                let place = Place::of(&out, target.ending(), &own);
+                let place = Destination::of(&out, target.ending(), &own);
                 let mut claim = place.claim(target.ending())?;
                 let exported = export(opened, target, &place.stem, &options)?;
                 Ok((place.write(&exported, &inputs, &mut claim)?, exported.notes))
@@ -486,13 +486,13 @@ impl Case {
                 "matlab" => text(Target::Matlab),
                 "python" => text(Target::Python),
                 "fmu" => {
-                    let place = Place::of(&out, "fmu", &own);
+                    let place = Destination::of(&out, "fmu", &own);
                     let mut claim = place.claim("fmu")?;
                     let exported = fmu::export(opened, options.part, fmi, &place.stem)?;
                     Ok((place.write(&exported, &inputs, &mut claim)?, exported.notes))
                 }
                 "json" => {
-                    let place = Place::of(&out, "json", &own);
+                    let place = Destination::of(&out, "json", &own);
                     let mut claim = place.claim("json")?;
                     let content = json::text(&json::export(opened)?).into_bytes();
                     let files = vec![(format!("{}.json", place.stem), content)];

@@ -57,7 +57,7 @@ impl From<&control::Observation> for Observation {
 }
 
 /// How the object is called.
-enum Way {
+enum CallForm {
     /// `step(seen)`
     Step,
     /// `controller(position, reference)`
@@ -67,7 +67,7 @@ enum Way {
 /// The controller as the library steps it. The interpreter's lock is held while it lives.
 pub struct Own<'a, 'py> {
     object: Bound<'py, PyAny>,
-    way: Way,
+    way: CallForm,
     interrupt: &'a Interrupt,
 }
 
@@ -75,8 +75,8 @@ impl<'a, 'py> Own<'a, 'py> {
     /// Looks at what the object can do; what it raises goes to `interrupt`.
     pub fn new(object: &Bound<'py, PyAny>, interrupt: &'a Interrupt) -> PyResult<Self> {
         let way = match object.hasattr("step")? {
-            true => Way::Step,
-            false if object.is_callable() => Way::Call,
+            true => CallForm::Step,
+            false if object.is_callable() => CallForm::Call,
             false => {
                 return Err(PyTypeError::new_err(
                     "a controller is a function of (position, reference), or an object with a method step(seen)",
@@ -89,8 +89,8 @@ impl<'a, 'py> Own<'a, 'py> {
     fn command(&self, seen: &control::Observation) -> PyResult<f64> {
         let py = self.object.py();
         let command = match self.way {
-            Way::Step => self.object.call_method1(intern!(py, "step"), (Observation::from(seen),))?,
-            Way::Call => self.object.call1((seen.position, seen.reference.position))?,
+            CallForm::Step => self.object.call_method1(intern!(py, "step"), (Observation::from(seen),))?,
+            CallForm::Call => self.object.call1((seen.position, seen.reference.position))?,
         };
         let time = seen.time;
         match command.extract::<f64>() {

@@ -21,7 +21,7 @@ pub struct BlockId(usize);
 
 /// The operation of a block.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Kind {
+pub enum BlockKind {
     /// A signal that comes from outside.
     Input,
     /// A signal that goes outside.
@@ -52,7 +52,7 @@ pub enum Sign {
 /// A block with its place.
 #[derive(Debug, Clone, PartialEq)]
 struct Block {
-    kind: Kind,
+    kind: BlockKind,
     column: usize,
     row: f64,
     text: String,
@@ -90,7 +90,7 @@ impl Diagram {
 
     /// Adds a block; symbols in `text` may have subscripts (`τ_M`), `note`, of one or more lines,
     /// stands under the block.
-    pub fn block(&mut self, kind: Kind, column: usize, row: f64, text: &str, note: &str) -> BlockId {
+    pub fn block(&mut self, kind: BlockKind, column: usize, row: f64, text: &str, note: &str) -> BlockId {
         self.blocks.push(Block { kind, column, row, text: text.into(), note: note.into() });
         BlockId(self.blocks.len() - 1)
     }
@@ -135,7 +135,7 @@ impl Diagram {
         // Rows from the topmost lane or block to the lowest.
         let extents = self.blocks.iter().zip(&sizes).map(|(b, (_, h))| {
             let below = 4.0 + 17.0 * b.note.lines().count() as f64;
-            let above = if matches!(b.kind, Kind::Sum(_)) { 22.0 } else { 4.0 };
+            let above = if matches!(b.kind, BlockKind::Sum(_)) { 22.0 } else { 4.0 };
             (b.row * row - h / 2.0 - above, b.row * row + h / 2.0 + below)
         });
         let lanes = self.wires.iter().filter_map(|w| w.lane).map(|l| (l * row - 20.0, l * row + 8.0));
@@ -166,7 +166,7 @@ impl Port {
     fn at(self, (x, y): (f64, f64), (w, h): (f64, f64), block: &Block) -> (f64, f64) {
         let along = |f: f64| match &block.kind {
             // A sum's inputs lie as far apart as rows do.
-            Kind::Sum(_) => f * (h - SUM_ENDS) / 2.0,
+            BlockKind::Sum(_) => f * (h - SUM_ENDS) / 2.0,
             _ => f * h / 2.0,
         };
         match self {
@@ -239,14 +239,14 @@ impl Block {
         let text = text_width(&self.text, 14.0, true);
         let note = self.note.lines().map(|l| text_width(l, 11.5, true)).fold(0.0, f64::max);
         match &self.kind {
-            Kind::Input | Kind::Output => (text.max(note) + 6.0, 24.0),
+            BlockKind::Input | BlockKind::Output => (text.max(note) + 6.0, 24.0),
             // The note is wider than the triangle at times: it counts.
-            Kind::Gain => ((text + 44.0).max(note + 6.0).max(56.0), 38.0),
-            Kind::Sum(signs) => (28.0, row * (signs.len().max(1) - 1) as f64 + SUM_ENDS),
-            Kind::Minus => (24.0, 24.0),
-            Kind::Integrator => (40.0, 40.0),
-            Kind::Function => (text.max(note).max(70.0) + 20.0, 50.0),
-            Kind::System(lines) => {
+            BlockKind::Gain => ((text + 44.0).max(note + 6.0).max(56.0), 38.0),
+            BlockKind::Sum(signs) => (28.0, row * (signs.len().max(1) - 1) as f64 + SUM_ENDS),
+            BlockKind::Minus => (24.0, 24.0),
+            BlockKind::Integrator => (40.0, 40.0),
+            BlockKind::Function => (text.max(note).max(70.0) + 20.0, 50.0),
+            BlockKind::System(lines) => {
                 let widest = lines.iter().map(|l| text_width(l, 12.0, true)).fold(text * 1.08, f64::max);
                 (widest + 38.0, 40.0 + 18.0 * lines.len() as f64)
             }
@@ -256,11 +256,13 @@ impl Block {
     fn draw(&self, out: &mut Svg, (x, y): (f64, f64), (w, h): (f64, f64)) {
         let edge: &Paint = svg::INK;
         match &self.kind {
-            Kind::Input => {
+            BlockKind::Input => {
                 out.symbol((x + w / 2.0 - 3.0, y + 5.0), 14.0, Anchor::End, svg::INK, "", &self.text);
             }
-            Kind::Output => out.symbol((x - w / 2.0 + 5.0, y + 5.0), 14.0, Anchor::Start, svg::INK, "", &self.text),
-            Kind::Gain => {
+            BlockKind::Output => {
+                out.symbol((x - w / 2.0 + 5.0, y + 5.0), 14.0, Anchor::Start, svg::INK, "", &self.text)
+            }
+            BlockKind::Gain => {
                 // A triangle is the sign of a gain; stretched to a house so that symbols fit.
                 let (l, r, t, b) = (x - w / 2.0, x + w / 2.0, y - h / 2.0, y + h / 2.0);
                 let roof = r - 18.0;
@@ -270,7 +272,7 @@ impl Block {
                 out.path(&d, edge, 1.3, "");
                 out.symbol(((l + roof + 6.0) / 2.0, y + 5.0), 14.0, Anchor::Middle, svg::INK, "", &self.text);
             }
-            Kind::Sum(signs) => {
+            BlockKind::Sum(signs) => {
                 out.rect((x - w / 2.0, y - h / 2.0), (w, h), w / 2.0, svg::SOFT, edge, 1.3);
                 let k = signs.len();
                 for (i, sign) in signs.iter().enumerate() {
@@ -280,20 +282,20 @@ impl Block {
                 }
                 out.symbol((x, y - h / 2.0 - 7.0), 14.0, Anchor::Middle, svg::INK, "", "Σ");
             }
-            Kind::Minus => {
+            BlockKind::Minus => {
                 out.circle((x, y), w / 2.0, svg::SOFT, edge, 1.3);
                 sign_mark(out, (x - w / 2.0 - 9.0, y + 11.0), Sign::Plus);
                 sign_mark(out, (x + 11.0, y - h / 2.0 - 9.0), Sign::Minus);
             }
-            Kind::Integrator => {
+            BlockKind::Integrator => {
                 out.rect((x - w / 2.0, y - h / 2.0), (w, h), 3.0, svg::SOFT, edge, 1.3);
                 out.symbol((x, y + 7.0), 20.0, Anchor::Middle, svg::INK, "", "∫");
             }
-            Kind::Function => {
+            BlockKind::Function => {
                 out.rect((x - w / 2.0, y - h / 2.0), (w, h), 3.0, svg::SOFT, edge, 1.3);
                 out.symbol((x, y + 5.0), 14.0, Anchor::Middle, svg::INK, "", &self.text);
             }
-            Kind::System(lines) => {
+            BlockKind::System(lines) => {
                 out.rect((x - w / 2.0, y - h / 2.0), (w, h), 4.0, svg::SOFT, edge, 1.3);
                 let top = y - h / 2.0 + 24.0;
                 out.symbol((x, top), 14.0, Anchor::Middle, svg::INK, " font-weight=\"600\"", &self.text);

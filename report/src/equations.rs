@@ -1,6 +1,6 @@
 //! The equations that run, drawn: one body (after Fig. 18) and the whole axis (after Fig. 19).
 
-use super::diagram::{Diagram, Kind, Port, Sign};
+use super::diagram::{BlockKind, Diagram, Port, Sign};
 use taut::number::engineering;
 
 /// One equation of motion with its numbers, as the solver uses them.
@@ -75,36 +75,36 @@ pub fn body_diagram(body: &BodyEquation) -> String {
     let terms: Vec<&Term> = body.terms.iter().filter(|t| t.value != 0.0).collect();
     let middle = (terms.len().max(1) - 1) as f64 / 2.0;
     let mut d = Diagram::new(66.0);
-    let sum = d.block(Kind::Sum(terms.iter().map(|t| t.sign).collect()), 2, middle, "", "");
+    let sum = d.block(BlockKind::Sum(terms.iter().map(|t| t.sign).collect()), 2, middle, "", "");
     for (i, term) in terms.iter().enumerate() {
         let row = i as f64;
-        let input = d.block(Kind::Input, 0, row, &term.input, "");
+        let input = d.block(BlockKind::Input, 0, row, &term.input, "");
         let along = if terms.len() > 1 { 2.0 * i as f64 / (terms.len() - 1) as f64 - 1.0 } else { 0.0 };
         if term.gain.is_empty() {
             d.connect((input, Port::Right(0.0)), (sum, Port::Left(along)), "");
         } else {
             let value = engineering(term.value, &term.unit, 4);
-            let gain = d.block(Kind::Gain, 1, row, &term.gain, &value);
+            let gain = d.block(BlockKind::Gain, 1, row, &term.gain, &value);
             d.wire(input, gain);
             d.connect((gain, Port::Right(0.0)), (sum, Port::Left(along)), "");
         }
     }
     // The friction function stands above the line from the sum to the difference.
     let lift = middle - 1.75;
-    let friction = d.block(Kind::Function, 3, lift, &body.friction.symbol, &body.friction.parameters.join("\n"));
-    let minus = d.block(Kind::Minus, 4, middle, "", "");
+    let friction = d.block(BlockKind::Function, 3, lift, &body.friction.symbol, &body.friction.parameters.join("\n"));
+    let minus = d.block(BlockKind::Minus, 4, middle, "", "");
     let inertia = &body.inertia;
     let inverse = d.block(
-        Kind::Gain,
+        BlockKind::Gain,
         5,
         middle,
         &format!("1/{}", inertia.symbol),
         &format!("{} = {}", inertia.symbol, engineering(inertia.value, &inertia.unit, 4)),
     );
-    let speed = d.block(Kind::Integrator, 6, middle, "", "");
-    let position = d.block(Kind::Integrator, 7, middle, "", "");
-    let out = d.block(Kind::Output, 8, middle, &body.position, "");
-    let out_speed = d.block(Kind::Output, 8, middle + 1.0, &body.speed, "");
+    let speed = d.block(BlockKind::Integrator, 6, middle, "", "");
+    let position = d.block(BlockKind::Integrator, 7, middle, "", "");
+    let out = d.block(BlockKind::Output, 8, middle, &body.position, "");
+    let out_speed = d.block(BlockKind::Output, 8, middle + 1.0, &body.speed, "");
     d.gap(2, 40.0);
     d.gap(5, 62.0);
     d.gap(6, 76.0);
@@ -123,14 +123,14 @@ pub fn body_diagram(body: &BodyEquation) -> String {
 /// The whole: the motor and three bodies, drive pulley, cart and idler pulley, with the signals between them.
 pub fn axis_diagram(motor: &MotorEquation, bodies: [&BodyEquation; 3]) -> String {
     let mut d = Diagram::new(120.0);
-    let input = d.block(Kind::Input, 0, 0.0, &motor.input, "");
-    let drive_motor = d.block(Kind::System(motor.lines.clone()), 1, 0.0, "Motor", "");
+    let input = d.block(BlockKind::Input, 0, 0.0, &motor.input, "");
+    let drive_motor = d.block(BlockKind::System(motor.lines.clone()), 1, 0.0, "Motor", "");
     let [drive, cart, idler] = [0, 1, 2].map(|i| {
         let body = bodies[i];
         let inertia = &body.inertia;
         let mut lines = vec![format!("{} = {}", inertia.symbol, engineering(inertia.value, &inertia.unit, 4))];
         lines.extend(body.friction.parameters.iter().cloned());
-        d.block(Kind::System(lines), 2 + i, 0.0, &body.name, "")
+        d.block(BlockKind::System(lines), 2 + i, 0.0, &body.name, "")
     });
     d.gap(0, 40.0);
     d.gap(1, 62.0);

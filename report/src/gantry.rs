@@ -4,7 +4,7 @@
 use super::drawing::friction;
 use super::svg::{self, Anchor, Colour, Paint, Svg, n};
 use std::f64::consts::PI;
-use taut::machine::{AmplifierMode, EncoderPlace, Kind, Machine, Slide};
+use taut::machine::{AmplifierMode, EncoderPlace, Machine, MachineKind, Slide};
 use taut::mechanism::{Amplifier, Motor};
 use taut::number::engineering;
 
@@ -35,9 +35,9 @@ pub fn gantry_drawing(gantry: &Machine) -> String {
     rails(&mut out);
     bridge(&mut out);
     match gantry.kind {
-        Kind::HFrame => h_frame(&mut out, gantry),
-        Kind::Axis | Kind::CoreXy => core_xy(&mut out, gantry),
-        Kind::DualBelt => dual_belt(&mut out, gantry),
+        MachineKind::HFrame => h_frame(&mut out, gantry),
+        MachineKind::Axis | MachineKind::CoreXy => core_xy(&mut out, gantry),
+        MachineKind::DualBelt => dual_belt(&mut out, gantry),
     }
     directions(&mut out);
     for side in 0..gantry.drives.len() {
@@ -52,9 +52,9 @@ pub fn gantry_drawing(gantry: &Machine) -> String {
     block(&mut out, (430.0, 508.0), Anchor::Middle, "Drive pulleys", &lines);
     block(&mut out, (16.0, 276.0), Anchor::Start, "Bridge", &slide(gantry.first_slide(), "m_b", "x"));
     let cart = match gantry.kind {
-        Kind::HFrame => (496.0, 184.0),
-        Kind::Axis | Kind::CoreXy => (430.0, 184.0),
-        Kind::DualBelt => (430.0, 156.0),
+        MachineKind::HFrame => (496.0, 184.0),
+        MachineKind::Axis | MachineKind::CoreXy => (430.0, 184.0),
+        MachineKind::DualBelt => (430.0, 156.0),
     };
     block(&mut out, cart, Anchor::Middle, "Cart", &slide(&gantry.cart, "m_c", "y"));
     let (name, count) = (gantry.kind.name(), if gantry.drives.len() == 2 { "two" } else { "three" });
@@ -297,13 +297,13 @@ fn drive(out: &mut Svg, gantry: &Machine, side: usize) {
     out.circle((x, y), radius, svg::SOFT, svg::AXIS, 1.2);
     out.circle((x, y), 3.5, svg::PAPER, svg::INK, 1.4);
     let (symbol, clockwise) = match (gantry.kind, side) {
-        (Kind::HFrame, 0) => ("φ₁", true),
-        (Kind::HFrame, _) => ("φ₂", true),
-        (Kind::Axis | Kind::CoreXy, 0) => ("φ_A", false),
-        (Kind::Axis | Kind::CoreXy, _) => ("φ_B", true),
-        (Kind::DualBelt, 0) => ("φ₁", false),
-        (Kind::DualBelt, 1) => ("φ₂", true),
-        (Kind::DualBelt, _) => ("φ₃", false),
+        (MachineKind::HFrame, 0) => ("φ₁", true),
+        (MachineKind::HFrame, _) => ("φ₂", true),
+        (MachineKind::Axis | MachineKind::CoreXy, 0) => ("φ_A", false),
+        (MachineKind::Axis | MachineKind::CoreXy, _) => ("φ_B", true),
+        (MachineKind::DualBelt, 0) => ("φ₁", false),
+        (MachineKind::DualBelt, 1) => ("φ₂", true),
+        (MachineKind::DualBelt, _) => ("φ₃", false),
     };
     turn(out, (x, y), clockwise, if is_at_cart { 9.0 } else { 15.0 });
     let above = if is_at_cart { -20.0 } else { -40.0 };
@@ -325,7 +325,7 @@ fn drive(out: &mut Svg, gantry: &Machine, side: usize) {
         _ => ("Cart motor", 700.0),
     };
     let heading =
-        if gantry.kind == Kind::CoreXy { format!("{heading} ({})", ["A", "B"][side]) } else { heading.into() };
+        if gantry.kind == MachineKind::CoreXy { format!("{heading} ({})", ["A", "B"][side]) } else { heading.into() };
     let mut lines = motor_lines(motor, amplifier);
     if let Some(encoder) = gantry.encoder {
         let at = if encoder.at == EncoderPlace::Motor { "motor" } else { "pulley" };

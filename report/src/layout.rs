@@ -25,11 +25,11 @@ pub(crate) struct Layout {
     pub left: f64,
     pub wide: f64,
     pub x_ticks: Vec<(f64, String)>,
-    pub panels: Vec<Place>,
+    pub panels: Vec<PanelPlace>,
 }
 
 /// A panel's place.
-pub(crate) struct Place {
+pub(crate) struct PanelPlace {
     /// Of the plot area.
     pub top: f64,
     pub height: f64,
@@ -126,7 +126,7 @@ impl Layout {
             let heading = top - lift - 10.0 - (rows - 1) as f64 * LEGEND_ROW;
             legend.iter_mut().for_each(|entry| entry.y += heading);
             let height = height(panel, wide);
-            places.push(Place { top, height, ticks, heading, legend });
+            places.push(PanelPlace { top, height, ticks, heading, legend });
             top += height + if i + 1 < figure.panels.len() { 16.0 } else { 0.0 };
         }
         let x_ticks = x.ticks((wide / 80.0).round() as usize);

@@ -64,7 +64,7 @@ pub use svg::Colour;
 /// The drawing of a machine, with its values and positive directions. Works in light and dark.
 pub fn machine_drawing(machine: &taut::machine::Machine) -> String {
     match machine.kind {
-        taut::machine::Kind::Axis => drawing::stage_drawing(machine),
+        taut::machine::MachineKind::Axis => drawing::stage_drawing(machine),
         _ => gantry::gantry_drawing(machine),
     }
 }

@@ -3,7 +3,7 @@
 use super::axis::{Scale, in_range};
 use super::decimate::decimate;
 use super::figure::{Figure, Marker, Series, Style};
-use super::layout::{Layout, Place, RIGHT, scales, within};
+use super::layout::{Layout, PanelPlace, RIGHT, scales, within};
 use super::svg::{self, Anchor, Svg, n, text_width};
 use std::fmt::Write;
 
@@ -30,7 +30,7 @@ pub(crate) fn svg(figure: &Figure, with_title: bool) -> String {
     }
     let across = |v: f64| left + width * x.place(v);
     for (i, ((panel, y), place)) in figure.panels.iter().zip(&ys).zip(&layout.panels).enumerate() {
-        let &Place { top, height, ref ticks, heading, .. } = place;
+        let &PanelPlace { top, height, ref ticks, heading, .. } = place;
         let up = |v: f64| top + height * (1.0 - y.place(v));
         out.text((left, heading), 13.0, Anchor::Start, svg::INK, "", &panel.y.heading());
         legend(&mut out, &panel.series, place);
@@ -82,7 +82,7 @@ fn x_axis(out: &mut Svg, figure: &Figure, layout: &Layout, across: &dyn Fn(f64) 
     out.text((middle, bottom + 38.0), 13.0, Anchor::Middle, svg::INK, "", &figure.x.heading());
 }
 
-fn legend(out: &mut Svg, series: &[Series], place: &Place) {
+fn legend(out: &mut Svg, series: &[Series], place: &PanelPlace) {
     for entry in &place.legend {
         let &Series { style, colour, .. } = &series[entry.series];
         let (y, paint) = (entry.y - 4.3, colour.paint());

@@ -12,7 +12,7 @@ const NASTY: &str = "<script>alert(\"1\")</script> & 'two' \u{0}\u{1b}]]>";
 fn machine(encoder: Option<Encoder>) -> Machine {
     let pulley = Pulley { inertia: 6.3e-5, friction: Friction::with_breakaway(0.0016, 0.015, 0.02) };
     Machine {
-        kind: Kind::Axis,
+        kind: MachineKind::Axis,
         drives: vec![DriveUnit {
             motor: Motor {
                 torque_constant: 0.023,

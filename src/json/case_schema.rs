@@ -5,7 +5,7 @@
 
 use crate::design::FeedForwardModel;
 use crate::log::PRESETS;
-use crate::machine::{BELTS, Kind, Quantity};
+use crate::machine::{BELTS, MachineKind, Quantity};
 use crate::parameter::{self, Fallback, Parameter};
 use serde_json::{Map, Value, json};
 
@@ -113,7 +113,7 @@ fn root() -> Properties {
     };
     let tables = [
         ("title", text("What the file describes")),
-        ("kind", described(words(Kind::ALL.map(Kind::word)), "Which machine it is (default: axis)")),
+        ("kind", described(words(MachineKind::ALL.map(MachineKind::word)), "Which machine it is (default: axis)")),
         ("motor", table("motor", &[])),
         ("drive", described(table("drive", &[]), "Instead of [motor]: a drive of which only the force is known")),
         ("amplifier", amplifier()),
@@ -253,7 +253,8 @@ fn experiment() -> Value {
         both.extend(keys("gantry.initial", &[]));
         object(&both)
     };
-    let sides = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Axis).flat_map(|kind| kind.geometry().sides());
+    let sides =
+        MachineKind::ALL.into_iter().filter(|kind| *kind != MachineKind::Axis).flat_map(|kind| kind.geometry().sides());
     let sides = sides.map(|side| (side.to_string(), reference("input"))).collect();
     table(
         "experiment",
@@ -290,7 +291,7 @@ fn log() -> Value {
         ("separator", json!({ "type": "string" })),
         ("decimal", words([".", ","])),
     ];
-    let drives = Kind::ALL.iter().flat_map(|kind| kind.geometry().drives);
+    let drives = MachineKind::ALL.iter().flat_map(|kind| kind.geometry().drives);
     own.extend(drives.map(|drive| (drive.input, column())));
     own.extend(Quantity::all().map(|quantity| (quantity.name(), column())));
     table("experiment.log", &own)

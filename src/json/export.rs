@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::export::{self, ElementKind, Exported, Row, Tables, Then};
 use crate::linear::{Operation, System};
 use crate::machine::Machine;
-use crate::mechanism::{Kind, Mechanism, Over, SpringLaw};
+use crate::mechanism::{Mechanism, MotionKind, Over, SpringLaw};
 use crate::parameter;
 use serde_json::{Value, json};
 
@@ -70,7 +70,7 @@ fn bodies(mechanism: &Mechanism) -> Vec<Value> {
             "key": body.label.key,
             "name": body.label.name,
             "inertia": body.inertia,
-            "radius_m": match body.kind { Kind::Rotary { radius } => json!(radius), Kind::Linear => Value::Null },
+            "radius_m": match body.kind { MotionKind::Rotary { radius } => json!(radius), MotionKind::Linear => Value::Null },
             "units": { "position": way, "speed": speed, "load": load },
         })
     };

@@ -1,7 +1,9 @@
 //! A linear analysis: `taut modes --json`, `modes.json`. Frequencies are in Hz where they say so.
 
 use super::number;
-use crate::linear::{Analysis, ByInput, Discrete, ElasticMode, Natural, Place, RigidMode, Root, Transfer, Variable};
+use crate::linear::{
+    Analysis, ByInput, Discrete, ElasticMode, Natural, ResonancesAt, RigidMode, Root, Transfer, Variable,
+};
 use crate::mechanism::Mechanism;
 use nalgebra::{Complex, DMatrix, DVector};
 use serde_json::{Map, Value, json};
@@ -157,7 +159,7 @@ fn pair(frequency: f64, damping: f64, root: Root) -> Value {
     })
 }
 
-fn place(place: &Place) -> Value {
+fn place(place: &ResonancesAt) -> Value {
     let pairs = |roots: &[Root]| -> Vec<Value> {
         let told = |root: &Root| match *root {
             Root::Pair { frequency, damping } => Some(pair(frequency, damping, *root)),

@@ -6,7 +6,7 @@ use crate::control::belts::{Belts, Sides};
 use crate::control::compare::{Comparison, Pair};
 use crate::control::diagonals::{Curve, Diagonals, Model};
 use crate::control::pairs;
-use crate::control::recommendation::{Findings, Found, Left, Source};
+use crate::control::recommendation::{Findings, Left, ShaperFile, Source};
 use crate::control::shaper::Shaper;
 use crate::control::shaping::Fitted;
 use crate::control::spectrum::Spectrum;
@@ -25,7 +25,7 @@ pub fn shape(found: &Findings) -> Value {
     value
 }
 
-fn one(found: &Found) -> Value {
+fn one(found: &ShaperFile) -> Value {
     let best = found.choice.best();
     let criterion = &found.criterion;
     let mut value = json!({

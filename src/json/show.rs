@@ -1,7 +1,7 @@
 //! The overview of a machine: `taut show --json`, `show.json`.
 
 use super::number;
-use crate::overview::{Overview, Place, Row};
+use crate::overview::{FiguresAt, Overview, Row};
 use serde_json::{Value, json};
 
 /// The rows by what they are about, the places, and what should be known besides.
@@ -15,7 +15,7 @@ pub fn show(overview: &Overview) -> Value {
             "how": row.how,
         })
     };
-    let place = |place: &Place| {
+    let place = |place: &FiguresAt| {
         json!({
             "position_m": place.position,
             "span_stiffness_newton_per_m": place.stiffness.iter().map(|k| number(*k)).collect::<Vec<_>>(),

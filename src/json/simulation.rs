@@ -3,7 +3,7 @@
 use super::fit::score;
 use crate::case::{Case, Experiment};
 use crate::fit::LogFit;
-use crate::machine::{AmplifierMode, Kind, Machine, Motor, axis};
+use crate::machine::{AmplifierMode, Machine, MachineKind, Motor, axis};
 use crate::mechanism::{Mechanism, STEPPERS};
 use crate::metrics::{
     self, EventCount, Extras, Figure, Metrics, OfDrive, OfLoad, OfSpan, Peak, Role, Seek, SteadySpeed, Worth,
@@ -432,12 +432,12 @@ pub(super) fn figure_lines() -> Vec<[String; 3]> {
             lines.push([path, kind.into(), words.into()]);
         }
     };
-    let machine = |kind: Kind| {
+    let machine = |kind: MachineKind| {
         let drives = kind.geometry().drives.len();
         let extras = Extras { stepper: drives <= STEPPERS, yaw: drives > 1 };
         [(kind, Extras::default()), (kind, extras)]
     };
-    let machines: Vec<(Kind, Extras)> = Kind::ALL.into_iter().flat_map(machine).collect();
+    let machines: Vec<(MachineKind, Extras)> = MachineKind::ALL.into_iter().flat_map(machine).collect();
     // Of more parts than any machine has.
     let nothing = Metrics {
         loads: vec![OfLoad::default(); 8],
@@ -447,7 +447,7 @@ pub(super) fn figure_lines() -> Vec<[String; 3]> {
         ..Metrics::default()
     };
     for figure in machines.iter().flat_map(|&(kind, extras)| metrics::figures(kind, extras)) {
-        let has = |(kind, extras): &(Kind, Extras), name: &str| {
+        let has = |(kind, extras): &(MachineKind, Extras), name: &str| {
             metrics::figures(*kind, *extras).iter().any(|one| one.by_role == name || one.name == name)
         };
         let of_all = |name: &str| machines.iter().all(|machine| has(machine, name));

@@ -1,7 +1,7 @@
 //! The belt: stiffness and damping of its spans, how far the load gives way, and its resonances along the travel.
 
 use super::direction::Direction;
-use super::{Group, Note, Place, TYPICAL_DAMPING, stepper, told};
+use super::{FiguresAt, Group, Note, TYPICAL_DAMPING, stepper, told};
 use crate::error::Result;
 use crate::linear::{self, Operation, Root};
 use crate::machine::{BeltModel, Machine, Travel};
@@ -15,7 +15,7 @@ const PLACES: usize = 7;
 const NOT_WHOLE: f64 = 0.1;
 
 /// The machine with what slides at several places, where the place makes a difference; else at the origin.
-pub(super) fn places(machine: &Machine) -> Result<Vec<Place>> {
+pub(super) fn places(machine: &Machine) -> Result<Vec<FiguresAt>> {
     along(machine).iter().map(|at| place(machine, at)).collect()
 }
 
@@ -34,7 +34,7 @@ fn along(machine: &Machine) -> Vec<Vec<f64>> {
     [vec![middle(x), middle(y)]].into_iter().chain(corners).collect()
 }
 
-pub(super) fn place(machine: &Machine, at: &[f64]) -> Result<Place> {
+pub(super) fn place(machine: &Machine, at: &[f64]) -> Result<FiguresAt> {
     // A stepper as a free inertia: its field holds it by a sine, not by a stiffness.
     let free = machine.stepper().map(|_| stepper::without_field(machine));
     let found = linear::place(free.as_ref().unwrap_or(machine), Operation::at(at))?;
@@ -46,10 +46,14 @@ pub(super) fn place(machine: &Machine, at: &[f64]) -> Result<Place> {
     let modes = found.undamped_resonances.iter().enumerate().map(|(k, hertz)| (*hertz, damped(k))).collect();
     let held = found.undamped_antiresonances.first().copied();
     let (stiffness, stretch) = (found.stiffness.to_vec(), found.compliance);
-    Ok(Place { position: at.to_vec(), stiffness, stretch, modes, held })
+    Ok(FiguresAt { position: at.to_vec(), stiffness, stretch, modes, held })
 }
 
-pub(super) fn belt(machine: &Machine, directions: &[Direction], (origin, places): (&Place, &[Place])) -> Option<Group> {
+pub(super) fn belt(
+    machine: &Machine,
+    directions: &[Direction],
+    (origin, places): (&FiguresAt, &[FiguresAt]),
+) -> Option<Group> {
     if machine.belt.model == BeltModel::Rigid {
         return None;
     }
@@ -88,15 +92,15 @@ pub(super) fn belt(machine: &Machine, directions: &[Direction], (origin, places)
 }
 
 /// The place at the origin, or where the travel of an axis comes nearest to it.
-fn nearest<'a>(origin: &'a Place, places: &'a [Place]) -> &'a Place {
-    let far = |place: &Place| place.position.iter().map(|x| x * x).sum::<f64>();
+fn nearest<'a>(origin: &'a FiguresAt, places: &'a [FiguresAt]) -> &'a FiguresAt {
+    let far = |place: &FiguresAt| place.position.iter().map(|x| x * x).sum::<f64>();
     match origin.position.len() {
         1 => places.iter().min_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(origin),
         _ => origin,
     }
 }
 
-fn resonances(group: &mut Group, is_axis: bool, place: &Place) {
+fn resonances(group: &mut Group, is_axis: bool, place: &FiguresAt) {
     for (k, (hertz, ratio)) in place.modes.iter().enumerate() {
         let number = k + 1;
         let name = if is_axis { "resonance" } else { "elastic mode" };

@@ -1,13 +1,18 @@
 //! How fast and how quickly the drives move the load, and what their belt takes then.
 
 use super::direction::{Direction, Resistance};
-use super::{Group, Note, Place, stepper, told};
+use super::{FiguresAt, Group, Note, stepper, told};
 use crate::case::Case;
 use crate::design::Design;
 use crate::machine::{Amplifier, AmplifierMode, BeltModel, BeltSheet, Machine, Motor};
 use crate::signal::Signal;
 
-pub(super) fn limits(case: &Case, directions: &[Direction], origin: &Place, notes: &mut Vec<Note>) -> Option<Group> {
+pub(super) fn limits(
+    case: &Case,
+    directions: &[Direction],
+    origin: &FiguresAt,
+    notes: &mut Vec<Note>,
+) -> Option<Group> {
     let machine = &case.machine;
     if machine.stepper().is_some() {
         return stepper::limits(machine);

@@ -2,7 +2,7 @@
 //! [`FIGURES`](crate::metrics::FIGURES).
 
 use crate::control::MoveRun;
-use crate::machine::{DriveAt, Kind};
+use crate::machine::{DriveAt, MachineKind};
 use crate::mechanism::Label;
 use crate::metrics;
 
@@ -100,7 +100,7 @@ const OF_MOVE: &[Row] = &[
 ];
 
 /// The figures of moves of a kind of machine.
-pub fn of_move(kind: Kind) -> Vec<Measure> {
+pub fn of_move(kind: MachineKind) -> Vec<Measure> {
     let geometry = kind.geometry();
     let loads: Vec<Label> = geometry.slides.iter().map(|slide| geometry.label(slide.body)).collect();
     let side = |drive: &DriveAt| Label { key: geometry.drive_key(drive), name: drive.label.name };

@@ -10,13 +10,13 @@ pub(super) struct Points {
     seed: u64,
     /// Number of samples: of runs, or of the blocks that indices are made of.
     samples: u64,
-    kind: Kind,
+    kind: SamplingScheme,
     /// True if runs come in blocks of k + 2.
     blocks: bool,
 }
 
 #[derive(Debug, Clone)]
-enum Kind {
+enum SamplingScheme {
     Random,
     LatinHypercube,
     Sobol(Sobol),
@@ -30,17 +30,19 @@ impl Points {
     /// Those of drawn designs, `samples` in all, of so many parameters.
     pub fn new(sampling: Sampling, seed: u64, samples: u64, parameters: usize, blocks: bool) -> Self {
         let kind = match sampling {
-            Sampling::Random => Kind::Random,
-            Sampling::LatinHypercube => Kind::LatinHypercube,
-            Sampling::Sobol => Kind::Sobol(Sobol::new(if blocks { 2 * parameters } else { parameters }, seed)),
-            Sampling::Grid | Sampling::OneAtATime => Kind::Grid,
+            Sampling::Random => SamplingScheme::Random,
+            Sampling::LatinHypercube => SamplingScheme::LatinHypercube,
+            Sampling::Sobol => {
+                SamplingScheme::Sobol(Sobol::new(if blocks { 2 * parameters } else { parameters }, seed))
+            }
+            Sampling::Grid | Sampling::OneAtATime => SamplingScheme::Grid,
         };
         Self { seed, samples, kind, blocks }
     }
 
     /// The machine as it is, then these changes.
     pub fn one_at_a_time(seed: u64, changes: Vec<(usize, f64)>) -> Self {
-        Self { seed, samples: changes.len() as u64 + 1, kind: Kind::OneAtATime(changes), blocks: false }
+        Self { seed, samples: changes.len() as u64 + 1, kind: SamplingScheme::OneAtATime(changes), blocks: false }
     }
 
     /// Which draw of `count` a run takes: each as often as any other, in an order of chance.
@@ -61,7 +63,7 @@ impl Points {
         let all = if self.blocks { 2 * dimensions } else { dimensions };
         let place = |j: usize| if self.blocks && from_b(j) { dimensions + j } else { j };
         match &self.kind {
-            Kind::Random => {
+            SamplingScheme::Random => {
                 let mut uniform = Uniform::of_run(self.seed, sample, all);
                 if !self.blocks {
                     values.extend(parameters.iter().map(|parameter| parameter.distribution.quantile(uniform.next())));
@@ -70,7 +72,7 @@ impl Points {
                 let shares: Vec<f64> = (0..all).map(|_| uniform.next()).collect();
                 values.extend(parameters.iter().enumerate().map(|(j, p)| p.distribution.quantile(shares[place(j)])));
             }
-            Kind::LatinHypercube => {
+            SamplingScheme::LatinHypercube => {
                 let mut uniform = Uniform::of_run(self.seed, sample, all);
                 let shares: Vec<f64> = (0..all).map(|_| uniform.next()).collect();
                 for (j, parameter) in parameters.iter().enumerate() {
@@ -80,11 +82,11 @@ impl Points {
                     values.push(parameter.distribution.quantile(share.min(1.0 - 2f64.powi(-53))));
                 }
             }
-            Kind::Sobol(sobol) => {
+            SamplingScheme::Sobol(sobol) => {
                 let share = |j: usize| sobol.coordinate(sample, place(j));
                 values.extend(parameters.iter().enumerate().map(|(j, p)| p.distribution.quantile(share(j))));
             }
-            Kind::Grid => {
+            SamplingScheme::Grid => {
                 let begin = values.len();
                 let mut rest = run;
                 for parameter in parameters.iter().rev() {
@@ -95,7 +97,7 @@ impl Points {
                 }
                 values[begin..].reverse();
             }
-            Kind::OneAtATime(changes) => {
+            SamplingScheme::OneAtATime(changes) => {
                 let begin = values.len();
                 values.extend(parameters.iter().map(|parameter| parameter.free.start));
                 if let Some((place, value)) = run.checked_sub(1).and_then(|change| changes.get(change as usize)) {
@@ -108,7 +110,7 @@ impl Points {
     /// True if a run sets parameter `place`; one at a time leaves the others exactly as they are.
     pub fn varies(&self, run: u64, place: usize) -> bool {
         match &self.kind {
-            Kind::OneAtATime(changes) => {
+            SamplingScheme::OneAtATime(changes) => {
                 run.checked_sub(1).and_then(|change| changes.get(change as usize)).is_some_and(|(p, _)| *p == place)
             }
             _ => true,

@@ -96,17 +96,17 @@ impl State {
 
     /// Takes room for a file of so many bytes before they are received; none where all files together would have more
     /// than `most`.
-    pub fn room(self: &Arc<Self>, bytes: usize, most: usize) -> Option<Room> {
+    pub fn room(self: &Arc<Self>, bytes: usize, most: usize) -> Option<UploadReservation> {
         let add = |n: usize| n.checked_add(bytes).filter(|sum| *sum <= most);
         let taken = self.uploaded.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add);
-        taken.ok().map(|_| Room { state: Arc::clone(self), bytes })
+        taken.ok().map(|_| UploadReservation { state: Arc::clone(self), bytes })
     }
 
     /// Takes a place for long work, of which there are as many as processors; none where all are taken.
-    pub fn begin_long(&self) -> Option<Place> {
+    pub fn begin_long(&self) -> Option<JobSlot> {
         let most = std::thread::available_parallelism().map_or(2, usize::from).max(2);
         let taken = self.long.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |n| (n < most).then_some(n + 1));
-        taken.ok().map(|_| Place(Arc::clone(&self.long)))
+        taken.ok().map(|_| JobSlot(Arc::clone(&self.long)))
     }
 }
 
@@ -147,28 +147,28 @@ impl Host for State {
 }
 
 /// Room for a file that is on its way; dropped, it is free again.
-pub struct Room {
+pub struct UploadReservation {
     state: Arc<State>,
     bytes: usize,
 }
 
-impl Room {
+impl UploadReservation {
     /// Takes it for good, for a file that turned out to have so many bytes.
     pub fn keep(mut self, bytes: usize) {
         self.bytes -= bytes.min(self.bytes);
     }
 }
 
-impl Drop for Room {
+impl Drop for UploadReservation {
     fn drop(&mut self) {
         self.state.uploaded.fetch_sub(self.bytes, Ordering::Relaxed);
     }
 }
 
 /// The place of a long work; dropped, it is free again.
-pub struct Place(Arc<AtomicUsize>);
+pub struct JobSlot(Arc<AtomicUsize>);
 
-impl Drop for Place {
+impl Drop for JobSlot {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }

@@ -16,7 +16,7 @@ pub mod wrong;
 use taut::case::{Case, Experiment};
 use taut::friction::{Friction, Law, Shape};
 use taut::machine::{
-    Amplifier, AmplifierMode, Belt, BeltMake, DriveUnit, Kind, Machine, Motor, Pulley, Slide, Spans, Travel,
+    Amplifier, AmplifierMode, Belt, BeltMake, DriveUnit, Machine, MachineKind, Motor, Pulley, Slide, Spans, Travel,
 };
 use taut::mechanism::State;
 use taut::signal::Signal;
@@ -26,7 +26,7 @@ use taut::solve::{Ending, Solution, Solver, simulate};
 pub fn paper_stage(stiffness: impl Into<Spans>, inertia: f64, pulley: Friction, cart: Friction) -> Machine {
     let pulley = Pulley { inertia, friction: pulley };
     Machine {
-        kind: Kind::Axis,
+        kind: MachineKind::Axis,
         drives: vec![DriveUnit {
             motor: Motor {
                 torque_constant: 0.023,

@@ -4,8 +4,8 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use taut::friction::{Friction, Side};
 use taut::machine::{
-    Amplifier, AmplifierMode, Belt, BeltModel, DriveUnit, EndStop, GearPlay, Kind, Machine, Motor, Pulley, Slide,
-    SlideForces, Travel,
+    Amplifier, AmplifierMode, Belt, BeltModel, DriveUnit, EndStop, GearPlay, Machine, MachineKind, Motor, Pulley,
+    Slide, SlideForces, Travel,
 };
 use taut::polyline::Polyline;
 use taut::signal::Signal;
@@ -93,7 +93,7 @@ pub fn machine(dry: Dry) -> impl Strategy<Value = Machine> {
         .prop_map(|(stiffness, damping)| Belt::given(stiffness, damping));
     (motor, amplifier, decades(0.005, 0.04), pulley(), cart, pulley(), belt).prop_map(
         |(motor, amplifier, pulley_radius, drive_pulley, cart, idler_pulley, belt)| Machine {
-            kind: Kind::Axis,
+            kind: MachineKind::Axis,
             drives: vec![DriveUnit { motor, amplifier }],
             bridge: None,
             yaw: None,

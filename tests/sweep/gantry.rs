@@ -2,7 +2,7 @@
 
 use super::{bits, rows};
 use taut::case::{Case, Given, Sampling};
-use taut::machine::Kind;
+use taut::machine::MachineKind;
 use taut::metrics::{Extras, Meter, Metrics, figures};
 use taut::parameter::{Free, every, values};
 use taut::solve::{Course, Detail, Flow, Solver, stream_mechanism};
@@ -150,11 +150,13 @@ fn figures_are_those_of_the_columns() {
             let r = gantry.pulley_radius;
             // One span for each drive tells of all: those of a belt add up to nothing.
             let spans: &[(&str, &str, [f64; 3])] = match gantry.kind {
-                Kind::HFrame => &[("left_span", "left", [1.0, 1.0, 1.0]), ("right_span", "right", [-1.0, 1.0, -1.0])],
-                Kind::Axis | Kind::CoreXy => {
+                MachineKind::HFrame => {
+                    &[("left_span", "left", [1.0, 1.0, 1.0]), ("right_span", "right", [-1.0, 1.0, -1.0])]
+                }
+                MachineKind::Axis | MachineKind::CoreXy => {
                     &[("a_out_span", "left", [1.0, -1.0, -1.0]), ("b_out_span", "right", [1.0, -1.0, 1.0])]
                 }
-                Kind::DualBelt => &[
+                MachineKind::DualBelt => &[
                     ("left_back_span", "left", [-1.0, 1.0, 0.0]),
                     ("right_out_span", "right", [1.0, -1.0, 0.0]),
                     ("cart_back_span", "cart_pulley", [-1.0, 0.0, 1.0]),

@@ -3,7 +3,7 @@
 use super::{Case, Experiment, Move, Plan, Unread, suggestion};
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::machine::Kind;
+use crate::machine::MachineKind;
 use std::path::Path;
 
 impl Case {
@@ -17,7 +17,7 @@ impl Case {
 
     /// True if its machine is a single axis.
     pub fn is_axis(&self) -> bool {
-        self.machine.kind == Kind::Axis
+        self.machine.kind == MachineKind::Axis
     }
 
     /// Refuses a case of which a file was not read, with the line that names it.

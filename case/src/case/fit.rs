@@ -2,7 +2,7 @@
 
 use super::Experiment;
 use super::reader::{Field, Table, nearest};
-use super::tree::Kind;
+use super::tree::NodeValue;
 use crate::error::Result;
 use crate::log::Quantity;
 use crate::machine::Machine;
@@ -440,9 +440,9 @@ fn value(field: &Field, key: &str) -> Result<f64> {
 /// A number without a unit.
 pub(super) fn plain(field: &Field, wanted: &str) -> Result<f64> {
     match &field.node.kind {
-        Kind::Float(value) if value.is_finite() => Ok(*value),
-        Kind::Integer(value) => Ok(*value as f64),
-        Kind::Float(value) => Err(field.fail(format!("expected {wanted}, found {value}"))),
+        NodeValue::Float(value) if value.is_finite() => Ok(*value),
+        NodeValue::Integer(value) => Ok(*value as f64),
+        NodeValue::Float(value) => Err(field.fail(format!("expected {wanted}, found {value}"))),
         other => Err(field.fail(format!("expected {wanted}, found {}", other.word()))),
     }
 }
@@ -533,16 +533,16 @@ fn nuisances(table: &Table, machine: &Machine, experiments: &[Experiment], whole
     let flag = |key: &str| match table.optional(key) {
         None => Ok(false),
         Some(field) => match &field.node.kind {
-            Kind::Bool(value) => Ok(*value),
+            NodeValue::Bool(value) => Ok(*value),
             other => Err(field.fail(format!("expected true or false, found {}", other.word()))),
         },
     };
     let scope = |key: &str| match table.optional(key) {
         None => Ok(Scope::Off),
         Some(field) => match &field.node.kind {
-            Kind::Bool(true) => Ok(Scope::Each),
-            Kind::Bool(false) => Ok(Scope::Off),
-            Kind::Text(text) if text == "shared" => Ok(Scope::Shared),
+            NodeValue::Bool(true) => Ok(Scope::Each),
+            NodeValue::Bool(false) => Ok(Scope::Off),
+            NodeValue::Text(text) if text == "shared" => Ok(Scope::Shared),
             other => Err(field
                 .fail(format!("expected true, false or \"shared\", found {}", other.word()))
                 .next("true gives each log its own, \"shared\" all of them the same")),

@@ -6,20 +6,21 @@ use super::{input, machine, sheet, stepper};
 use crate::error::{Error, Result};
 use crate::friction::Friction;
 use crate::machine::{
-    Belt, BeltMake, BeltSheet, DriveAt, DriveUnit, Encoder, EncoderPlace, Kind, Machine, Pulley, Slide, Spans, Yaw,
+    Belt, BeltMake, BeltSheet, DriveAt, DriveUnit, Encoder, EncoderPlace, Machine, MachineKind, Pulley, Slide, Spans,
+    Yaw,
 };
 use crate::mechanism::{STEPPERS, State};
 use crate::signal::Signal;
 use std::path::Path;
 
 /// The kind of machine that the file describes.
-pub(super) fn kind(root: &Table) -> Result<Kind> {
-    let kinds = Kind::ALL.map(|kind| (kind.word(), kind));
-    root.optional("kind").map_or(Ok(Kind::Axis), |field| field.choice(&kinds))
+pub(super) fn kind(root: &Table) -> Result<MachineKind> {
+    let kinds = MachineKind::ALL.map(|kind| (kind.word(), kind));
+    root.optional("kind").map_or(Ok(MachineKind::Axis), |field| field.choice(&kinds))
 }
 
 /// The tables of a gantry's case. Errors: one that belongs to an axis, or that is not there yet.
-pub(super) fn tables(root: &Table, kind: Kind) -> Result<Vec<&'static str>> {
+pub(super) fn tables(root: &Table, kind: MachineKind) -> Result<Vec<&'static str>> {
     for key in ["travel", "idler_pulley"] {
         if let Some(field) = root.optional(key) {
             return Err(field.fail("this belongs to an axis").next(match key {
@@ -56,7 +57,7 @@ pub(super) fn tables(root: &Table, kind: Kind) -> Result<Vec<&'static str>> {
 }
 
 /// The machine of the file `name`.
-pub(super) fn machine(root: &Table, kind: Kind, name: &Path) -> Result<Machine> {
+pub(super) fn machine(root: &Table, kind: MachineKind, name: &Path) -> Result<Machine> {
     let gantry = gantry(root, kind)?;
     gantry.check_gantry().map_err(|error| if error.place.is_none() { error.in_file(name) } else { error })?;
     Ok(gantry)
@@ -66,7 +67,7 @@ fn table<'a>(root: &Table<'a>, name: &str, holds: &str) -> Result<Table<'a>> {
     root.required(name, &format!("a table [{name}] with {holds}"))?.table()
 }
 
-fn gantry(root: &Table, kind: Kind) -> Result<Machine> {
+fn gantry(root: &Table, kind: MachineKind) -> Result<Machine> {
     let drives = kind.geometry().drives.iter().map(|at| drive(root, at.label.key)).collect::<Result<Vec<_>>>()?;
     let pulley = table(root, "drive_pulley", "radius and inertia")?;
     pulley.check_keys(&[], &[])?;
@@ -187,7 +188,7 @@ fn yaw(root: &Table) -> Result<Option<Yaw>> {
     }))
 }
 
-fn belts(table: &Table, kind: Kind) -> Result<Belt> {
+fn belts(table: &Table, kind: MachineKind) -> Result<Belt> {
     table.check_keys(&["follows_cart", "type"], &[])?;
     let sheet = sheet::belt(table)?;
     let labels: Vec<&str> = kind.geometry().span_labels().map(|span| span.name.trim_end_matches(" span")).collect();

@@ -1,7 +1,7 @@
 //! The value of a case under a key: the other direction of `--set`.
 
 use super::source::Source;
-use super::tree::{Kind, Node};
+use super::tree::{Node, NodeValue};
 use super::{Case, set};
 use crate::error::{Error, Result};
 use crate::machine::{DriveAt, Geometry};
@@ -99,22 +99,22 @@ fn given<U: Fn(&str) -> &'static str>(node: &Node, section: &str, rows: &Rows<U>
     let place = (rows.place)(section);
     let row = || row(&place).or_else(|| row(place.strip_prefix("experiment.")?));
     match &node.kind {
-        Kind::Float(number) => Given::Number(*number),
-        Kind::Integer(number) => match row() {
+        NodeValue::Float(number) => Given::Number(*number),
+        NodeValue::Integer(number) => match row() {
             Some(row) if !row.unit.is_empty() => Given::Number(*number as f64),
             _ => Given::Whole(*number),
         },
-        Kind::Text(text) => {
+        NodeValue::Text(text) => {
             let value = row()
                 .and_then(|row| quantity::read(text, parameter::unit_for(row.unit, (rows.input_unit)(section))).ok());
             value.map_or_else(|| Given::Text(text.clone()), Given::Number)
         }
-        Kind::Bool(truth) => Given::Truth(*truth),
-        Kind::Date => Given::Text(String::new()),
-        Kind::List(nodes) | Kind::Tables(nodes) => {
+        NodeValue::Bool(truth) => Given::Truth(*truth),
+        NodeValue::Date => Given::Text(String::new()),
+        NodeValue::List(nodes) | NodeValue::Tables(nodes) => {
             Given::List(nodes.iter().map(|node| given(node, section, rows)).collect())
         }
-        Kind::Table(entries) => {
+        NodeValue::Table(entries) => {
             let entry = |e: &super::tree::Entry| (e.key.clone(), given(&e.node, &format!("{section}.{}", e.key), rows));
             Given::Table(entries.iter().map(entry).collect())
         }
@@ -194,35 +194,39 @@ fn collect<U: Fn(&str) -> &'static str>(
 ) {
     let below = |key: &str, step: &str| if key.is_empty() { step.to_string() } else { format!("{key}.{step}") };
     match &node.kind {
-        Kind::Table(entries) => {
+        NodeValue::Table(entries) => {
             // Keys in quotes name experiments and parameters of plans: they are no numbers of a machine.
             let is_bare = |key: &str| key.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'_' || b == b'-');
             for entry in entries.iter().filter(|entry| is_bare(&entry.key)) {
                 collect(&entry.node, (&below(key, &entry.key), &below(section, &entry.key)), rows, numbers);
             }
         }
-        Kind::List(nodes) | Kind::Tables(nodes) => {
+        NodeValue::List(nodes) | NodeValue::Tables(nodes) => {
             for (place, node) in nodes.iter().enumerate() {
                 collect(node, (&below(key, &place.to_string()), section), rows, numbers);
             }
         }
-        Kind::Float(_) | Kind::Integer(_) | Kind::Text(_) => {
+        NodeValue::Float(_) | NodeValue::Integer(_) | NodeValue::Text(_) => {
             let place = (rows.place)(section);
             let found = row(&place).or_else(|| row(place.strip_prefix("experiment.")?));
             let Some(row) = found else { return };
             let unit = parameter::unit_for(row.unit, (rows.input_unit)(section));
             let (value, written) = match &node.kind {
-                Kind::Float(value) => (*value, String::new()),
-                Kind::Integer(value) => (*value as f64, String::new()),
-                Kind::Text(text) => match quantity::read(text, unit) {
+                NodeValue::Float(value) => (*value, String::new()),
+                NodeValue::Integer(value) => (*value as f64, String::new()),
+                NodeValue::Text(text) => match quantity::read(text, unit) {
                     Ok(value) => (value, text.clone()),
                     Err(_) => return,
                 },
-                Kind::Bool(_) | Kind::Date | Kind::List(_) | Kind::Tables(_) | Kind::Table(_) => return,
+                NodeValue::Bool(_)
+                | NodeValue::Date
+                | NodeValue::List(_)
+                | NodeValue::Tables(_)
+                | NodeValue::Table(_) => return,
             };
             numbers.push(Number { key: key.to_string(), row, unit, value, written: Some(written) });
         }
-        Kind::Bool(_) | Kind::Date => {}
+        NodeValue::Bool(_) | NodeValue::Date => {}
     }
 }
 

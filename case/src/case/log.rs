@@ -3,7 +3,7 @@
 
 use super::files::Folder;
 use super::reader::{Field, Table};
-use super::tree::Kind;
+use super::tree::NodeValue;
 use crate::error::{Error, Result};
 use crate::log::{Clock, ColumnId, Dialect, Fed, Filter, In, Log, Mapping, PRESETS, Preset, Quantity, Source, Unit};
 use crate::machine::{self, BeltModel, Machine};
@@ -40,8 +40,9 @@ pub(super) fn logs(
 ) -> Result<Vec<(Option<String>, Log)>> {
     let table = field.table()?;
     let keys: Vec<&str> = KEYS.iter().copied().chain(columns_of(machine.kind)).collect();
-    let is_of_another =
-        |key: &&str| !keys.contains(key) && machine::Kind::ALL.into_iter().flat_map(columns_of).any(|own| own == *key);
+    let is_of_another = |key: &&str| {
+        !keys.contains(key) && machine::MachineKind::ALL.into_iter().flat_map(columns_of).any(|own| own == *key)
+    };
     if let Some(field) = table.keys().find(is_of_another).and_then(|key| table.optional(key)) {
         let what = format!("the log of this machine ({}) has no `{}`", machine.kind.name(), field.key());
         return Err(field.fail(what).allowed(columns_of(machine.kind).collect::<Vec<_>>().join(", ")));
@@ -115,7 +116,7 @@ pub(super) fn logs(
 }
 
 /// Keys of the columns that a log of this kind of machine can name, except time: drive inputs, then quantities.
-fn columns_of(kind: machine::Kind) -> impl Iterator<Item = &'static str> + Clone {
+fn columns_of(kind: machine::MachineKind) -> impl Iterator<Item = &'static str> + Clone {
     let inputs = kind.geometry().drives.iter().map(|drive| drive.input);
     inputs.chain(Quantity::of(kind).iter().map(|quantity| quantity.name()))
 }
@@ -318,12 +319,12 @@ fn example(unit: &str) -> &'static str {
 /// A column by name, or by number from 1.
 fn column(field: &Field) -> Result<ColumnId> {
     match &field.node.kind {
-        Kind::Integer(number) if *number >= 1 => Ok(ColumnId::Number(*number as usize)),
-        Kind::Integer(number) => Err(field.fail(format!("{number} is no column")).allowed("columns count from 1")),
-        Kind::Text(name) if name.trim().is_empty() => Err(field
+        NodeValue::Integer(number) if *number >= 1 => Ok(ColumnId::Number(*number as usize)),
+        NodeValue::Integer(number) => Err(field.fail(format!("{number} is no column")).allowed("columns count from 1")),
+        NodeValue::Text(name) if name.trim().is_empty() => Err(field
             .fail("the name of the column is empty")
             .next("a column without a name goes by its number, from 1")),
-        Kind::Text(name) => Ok(ColumnId::from(name.as_str())),
+        NodeValue::Text(name) => Ok(ColumnId::from(name.as_str())),
         other => Err(field
             .fail(format!("expected a column, found {}", other.word()))
             .next("write the column's name in quotes, or its number, from 1")),
@@ -355,9 +356,9 @@ fn filter(field: &Field) -> Result<Filter> {
     };
     let list = if values.is_list() { values.filled_list()? } else { vec![values] };
     let text = |field: &Field| match &field.node.kind {
-        Kind::Integer(number) => Ok(number.to_string()),
-        Kind::Float(number) if number.is_finite() => Ok(shortest(*number)),
-        Kind::Text(text) => Ok(text.trim().to_string()),
+        NodeValue::Integer(number) => Ok(number.to_string()),
+        NodeValue::Float(number) if number.is_finite() => Ok(shortest(*number)),
+        NodeValue::Text(text) => Ok(text.trim().to_string()),
         other => Err(field.fail(format!("expected a number or a text, found {}", other.word()))),
     };
     Ok(Filter { column, values: list.iter().map(text).collect::<Result<_>>()?, keep })
@@ -366,8 +367,8 @@ fn filter(field: &Field) -> Result<Filter> {
 /// The separator of the columns.
 fn separator(field: &Field) -> Result<char> {
     match &field.node.kind {
-        Kind::Text(text) if text == "\t" => Ok('\t'),
-        Kind::Text(text) if text == " " => Ok(' '),
+        NodeValue::Text(text) if text == "\t" => Ok('\t'),
+        NodeValue::Text(text) if text == " " => Ok(' '),
         _ => field.choice(&[(",", ','), (";", ';'), ("tab", '\t'), ("space", ' ')]),
     }
 }

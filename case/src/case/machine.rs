@@ -33,7 +33,7 @@ pub(super) fn machine(root: &Table) -> Result<Machine> {
     let pulley_radius = radius(&drive, sheet::pitch(root)?)?;
     let unit = stepper.map_or_else(|| brushed(root, (motor, simple, amplifier), pulley_radius), Ok)?;
     let mut machine = Machine {
-        kind: Kind::Axis,
+        kind: MachineKind::Axis,
         drives: vec![unit],
         pulley_radius,
         drive_pulley: pulley(&drive)?,

@@ -41,7 +41,7 @@ use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::log::Log;
 use crate::machine::axis::{CART, LABELS};
-use crate::machine::{Kind, Machine, Measurement};
+use crate::machine::{Machine, MachineKind, Measurement};
 use crate::mechanism::State;
 use crate::reach::feasible::Shortfall;
 use crate::signal::Signal;
@@ -191,12 +191,12 @@ impl Case {
         if accepted != Accepted::All && root.optional("stepper").is_some() {
             return Err(stepper::no_motor(&root));
         }
-        let tables = if kind == Kind::Axis { AXIS_TABLES.to_vec() } else { gantry::tables(&root, kind)? };
+        let tables = if kind == MachineKind::Axis { AXIS_TABLES.to_vec() } else { gantry::tables(&root, kind)? };
         root.check_keys(&tables, &[])?;
 
         let title = title(&root, name)?;
         let machine = match kind {
-            Kind::Axis => machine::machine(&root)?,
+            MachineKind::Axis => machine::machine(&root)?,
             _ => gantry::machine(&root, kind, name)?,
         };
         let folder = Folder::of(name, files);
@@ -305,11 +305,11 @@ fn read_text(path: &Path) -> Result<String> {
 
 /// The system's error on a file, in our words.
 fn told(error: &std::io::Error) -> String {
-    use std::io::ErrorKind as Kind;
+    use std::io::ErrorKind as MachineKind;
     match error.kind() {
-        Kind::NotFound => "there is no such file".to_string(),
-        Kind::PermissionDenied => "permission is denied".to_string(),
-        Kind::IsADirectory => "it is a folder".to_string(),
+        MachineKind::NotFound => "there is no such file".to_string(),
+        MachineKind::PermissionDenied => "permission is denied".to_string(),
+        MachineKind::IsADirectory => "it is a folder".to_string(),
         _ => error.to_string(),
     }
 }
@@ -466,7 +466,7 @@ fn check_name(field: &Field) -> Result<()> {
 /// The state at the start of an experiment, at rest at the origin where its table does not say.
 fn initial(experiment: &Table, machine: &Machine) -> Result<State> {
     let Some(field) = experiment.optional("initial") else { return Ok(State::default()) };
-    if machine.kind != Kind::Axis {
+    if machine.kind != MachineKind::Axis {
         return gantry::initial(&field.named("gantry.initial").table()?, machine);
     }
     let table = field.table()?;

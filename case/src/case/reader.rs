@@ -1,8 +1,8 @@
 //! From places in a text to meanings: fields and tables, each checked against the table of parameters.
 
 use super::source::Source;
-use super::tree::{Entry, Kind, Node};
-use crate::error::{Error, Place, Result};
+use super::tree::{Entry, Node, NodeValue};
+use crate::error::{Error, Result, SourceLocation};
 use crate::parameter::{self, Fallback, Parameter};
 use crate::quantity::{self, rounded};
 
@@ -68,9 +68,9 @@ impl<'a> Field<'a> {
             key => format!("write for example {key} = {example}"),
         };
         let (value, typed) = match &self.node.kind {
-            Kind::Integer(value) => (*value as f64, None),
-            Kind::Float(value) => (*value, None),
-            Kind::Text(text) => {
+            NodeValue::Integer(value) => (*value as f64, None),
+            NodeValue::Float(value) => (*value, None),
+            NodeValue::Text(text) => {
                 let value = quantity::read(text, unit).map_err(|e| {
                     let mut error = self.fail(e.what);
                     error.allowed = e.allowed;
@@ -109,8 +109,8 @@ impl<'a> Field<'a> {
     /// A seed, all of whose digits count: a double would round those beyond 2⁵³.
     pub fn seed(&self) -> Result<u64> {
         let digits = match &self.node.kind {
-            Kind::Integer(value) => Some(*value),
-            Kind::Text(text) => text.trim().parse().ok(),
+            NodeValue::Integer(value) => Some(*value),
+            NodeValue::Text(text) => text.trim().parse().ok(),
             _ => None,
         };
         match digits.and_then(|value| u64::try_from(value).ok()) {
@@ -122,7 +122,7 @@ impl<'a> Field<'a> {
 
     pub fn text(&self) -> Result<&'a str> {
         match &self.node.kind {
-            Kind::Text(text) => Ok(text),
+            NodeValue::Text(text) => Ok(text),
             other => Err(self.fail(format!("expected a text, found {}", other.word())).next("put the text in quotes")),
         }
     }
@@ -130,7 +130,7 @@ impl<'a> Field<'a> {
     /// `true` or `false`.
     pub fn truth(&self) -> Result<bool> {
         match &self.node.kind {
-            Kind::Bool(value) => Ok(*value),
+            NodeValue::Bool(value) => Ok(*value),
             other => Err(self
                 .fail(format!("expected true or false, found {}", other.word()))
                 .next("write true or false, without quotes")),
@@ -141,7 +141,7 @@ impl<'a> Field<'a> {
     pub fn choice<T: Copy>(&self, options: &[(&str, T)]) -> Result<T> {
         let words: Vec<&str> = options.iter().map(|(word, _)| *word).collect();
         let allowed = || words.iter().map(|w| format!("\"{w}\"")).collect::<Vec<_>>().join(" or ");
-        let Kind::Text(text) = &self.node.kind else {
+        let NodeValue::Text(text) = &self.node.kind else {
             return Err(self.fail(format!("expected a word, found {}", self.node.kind.word())).allowed(allowed()));
         };
         options.iter().find(|(word, _)| word == text).map(|(_, value)| *value).ok_or_else(|| {
@@ -155,7 +155,7 @@ impl<'a> Field<'a> {
 
     pub fn list(&self) -> Result<Vec<Field<'a>>> {
         match &self.node.kind {
-            Kind::List(nodes) | Kind::Tables(nodes) => Ok(nodes
+            NodeValue::List(nodes) | NodeValue::Tables(nodes) => Ok(nodes
                 .iter()
                 .enumerate()
                 .map(|(i, node)| Field { node, path: format!("{}.{i}", self.path), ..self.clone() })
@@ -185,7 +185,7 @@ impl<'a> Field<'a> {
 
     /// So many numbers, one for each span.
     pub fn numbers(&self, count: usize, per_span: &str) -> Result<Vec<f64>> {
-        let Kind::List(nodes) = &self.node.kind else {
+        let NodeValue::List(nodes) = &self.node.kind else {
             return Err(self.fail(format!("expected a list, found {}", self.node.kind.word())).allowed(per_span));
         };
         if nodes.len() != count {
@@ -195,17 +195,17 @@ impl<'a> Field<'a> {
     }
 
     pub fn is_table(&self) -> bool {
-        matches!(self.node.kind, Kind::Table(_))
+        matches!(self.node.kind, NodeValue::Table(_))
     }
 
     pub fn is_list(&self) -> bool {
-        matches!(self.node.kind, Kind::List(_) | Kind::Tables(_))
+        matches!(self.node.kind, NodeValue::List(_) | NodeValue::Tables(_))
     }
 
     pub fn table(&self) -> Result<Table<'a>> {
         match &self.node.kind {
-            Kind::Table(entries) => Ok(Table { field: self.clone(), entries, base: None }),
-            Kind::Tables(_) => Err(self
+            NodeValue::Table(entries) => Ok(Table { field: self.clone(), entries, base: None }),
+            NodeValue::Tables(_) => Err(self
                 .fail("there can be only one of these")
                 .next(format!("write [{}] with single brackets", self.path))),
             other => {
@@ -308,7 +308,7 @@ impl<'a> Table<'a> {
         let path = &self.field.path;
         let whole = if path.is_empty() { format!("[{key}]") } else { format!("`{path}.{key}`") };
         let place = match path.is_empty() {
-            true => Place::file(&self.field.source.name),
+            true => SourceLocation::file(&self.field.source.name),
             false => self.field.source.place(self.field.node.span.clone()),
         };
         Error::new(format!("{whole} is missing")).at(place).next(format!("add {example}"))

@@ -1,8 +1,8 @@
 //! `--set KEY=VALUE`: changes the text of a case and leaves its comments alone.
 
 use super::source::{Override, Source, equals};
-use super::tree::{Entry, Kind, Node};
-use crate::error::{Error, Place, Result};
+use super::tree::{Entry, Node, NodeValue};
+use crate::error::{Error, Result, SourceLocation};
 use crate::parameter;
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, Item, Key, Table, Value};
@@ -39,7 +39,7 @@ pub(super) fn apply(name: &Path, text: &str, changes: &[&str]) -> Result<Source>
 impl<'a> Change<'a> {
     fn new(argument: &'a str) -> Result<Self> {
         let usage = "write KEY=VALUE, such as --set cart.mass=\"0.5 kg\" or --set experiment.0.until=2s";
-        let whole = || Place::in_text("--set", argument, 0..argument.len());
+        let whole = || SourceLocation::in_text("--set", argument, 0..argument.len());
         let Some(place) = equals(argument) else {
             return Err(Error::new("there is no `=`").at(whole()).next(usage));
         };
@@ -53,7 +53,7 @@ impl<'a> Change<'a> {
         let value = match value.parse::<Value>() {
             Ok(parsed) => parsed,
             Err(_) if value.starts_with(['[', '{', '"', '\'']) => {
-                let at = Place::in_text("--set", argument, key.len() + 1..argument.len());
+                let at = SourceLocation::in_text("--set", argument, key.len() + 1..argument.len());
                 return Err(Error::new("this list, table or text is not complete")
                     .at(at)
                     .next("put texts inside it in quotes: [\"1 kN/m\", \"2 kN/m\"]"));
@@ -65,7 +65,7 @@ impl<'a> Change<'a> {
 
     fn fail(&self, what: impl Into<String>) -> Error {
         let key = equals(self.argument).unwrap_or(self.argument.len());
-        Error::new(what).at(Place::in_text("--set", self.argument, 0..key))
+        Error::new(what).at(SourceLocation::in_text("--set", self.argument, 0..key))
     }
 
     fn apply(&self, root: &mut Item) -> Result<()> {
@@ -206,7 +206,7 @@ pub(super) fn node<'n>(tree: &'n Node, key: &[String]) -> Option<(&'n Node, Stri
         // A name leads through a table, or is that of a part of a point.
         let name = match (entry, &node.kind) {
             (Some(entry), _) => Some(entry.key.as_str()),
-            (None, Kind::List(_)) if step.parse::<usize>().is_err() => Some(step.as_str()),
+            (None, NodeValue::List(_)) if step.parse::<usize>().is_err() => Some(step.as_str()),
             (None, _) => None,
         };
         if let Some(name) = name {
@@ -221,15 +221,15 @@ pub(super) fn node<'n>(tree: &'n Node, key: &[String]) -> Option<(&'n Node, Stri
 /// The entry of a table, or the element of a list by its number or its name; `before` leads to what stands there.
 fn child<'n>(node: &'n Node, step: &str, before: &[String]) -> Option<(&'n Node, Option<&'n Entry>)> {
     match &node.kind {
-        Kind::Table(entries) => {
+        NodeValue::Table(entries) => {
             let entry = entries.iter().find(|e| e.key == step)?;
             Some((&entry.node, Some(entry)))
         }
-        Kind::List(nodes) | Kind::Tables(nodes) => {
+        NodeValue::List(nodes) | NodeValue::Tables(nodes) => {
             let by_name = |n: &&Node| match &n.kind {
-                Kind::Table(entries) => {
-                    entries.iter().any(|e| e.key == "name" && matches!(&e.node.kind, Kind::Text(text) if text == step))
-                }
+                NodeValue::Table(entries) => entries
+                    .iter()
+                    .any(|e| e.key == "name" && matches!(&e.node.kind, NodeValue::Text(text) if text == step)),
                 _ => false,
             };
             let node = match step.parse::<usize>() {

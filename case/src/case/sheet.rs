@@ -1,7 +1,7 @@
 //! Numbers from data sheets: a motor's rating, a belt's type, a drive's force, damping as a ratio.
 
 use super::reader::{Field, Table, nearest};
-use super::tree::Kind;
+use super::tree::NodeValue;
 use crate::error::Result;
 use crate::machine::{BELTS, BeltSheet, BeltType, Rating, SimpleDrive, slowest_swing};
 use crate::mechanism::Mechanism;
@@ -155,9 +155,11 @@ pub(super) fn specific_stiffness(table: &Table, sheet: &BeltSheet) -> Result<Opt
     const PER_WIDTH: Parameter = Parameter::unwritten("N/m", Range::new(1e-15, 1e15), "14 kN/mm");
     let Some(field) = table.optional("specific_stiffness") else { return of_type(table, sheet) };
     let is_per_width = match &field.node.kind {
-        Kind::Text(text) => quantity::parse(text).is_ok_and(|given| given.dimension == Dimension::new(1, 0, -2, 0, 0)),
-        Kind::Integer(_) | Kind::Float(_) | Kind::Bool(_) | Kind::Date => false,
-        Kind::List(_) | Kind::Tables(_) | Kind::Table(_) => false,
+        NodeValue::Text(text) => {
+            quantity::parse(text).is_ok_and(|given| given.dimension == Dimension::new(1, 0, -2, 0, 0))
+        }
+        NodeValue::Integer(_) | NodeValue::Float(_) | NodeValue::Bool(_) | NodeValue::Date => false,
+        NodeValue::List(_) | NodeValue::Tables(_) | NodeValue::Table(_) => false,
     };
     if !is_per_width {
         return field.number().map(Some);

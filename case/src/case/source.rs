@@ -1,6 +1,6 @@
 //! The text of a case, and places in it.
 
-use crate::error::Place;
+use crate::error::SourceLocation;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -23,13 +23,13 @@ impl Source {
         Self { name: name.to_path_buf(), text, overrides: Vec::new() }
     }
 
-    pub fn place(&self, range: Range<usize>) -> Place {
+    pub fn place(&self, range: Range<usize>) -> SourceLocation {
         let set = self.overrides.iter().find(|o| o.range.start <= range.start && range.end <= o.range.end);
         if let Some(set) = set {
             let value = equals(&set.argument).map_or(0, |i| i + 1);
-            return Place::in_text("--set", &set.argument, value..set.argument.len());
+            return SourceLocation::in_text("--set", &set.argument, value..set.argument.len());
         }
-        Place::in_text(&self.name, &self.text, range)
+        SourceLocation::in_text(&self.name, &self.text, range)
     }
 }
 

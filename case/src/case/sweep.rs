@@ -2,7 +2,7 @@
 
 use super::fit::{free, pair, plain, prior_of};
 use super::reader::{Field, Table};
-use super::tree::{Entry, Kind, Node};
+use super::tree::{Entry, Node, NodeValue};
 use super::{Folder, Known, Plan, Prior};
 use crate::error::Result;
 use crate::machine::Machine;
@@ -249,8 +249,8 @@ fn variation(field: &Field, key: &str, design: Sampling, machine: &Machine) -> R
     let row = machine.row(key.split(" = ").next().unwrap_or(key));
     check_key(field, key, machine)?;
     let node = match &field.node.kind {
-        Kind::Text(text) => short(field, text)?,
-        Kind::List(_) => table_of(field.node, "values", field.node.kind.clone()),
+        NodeValue::Text(text) => short(field, text)?,
+        NodeValue::List(_) => table_of(field.node, "values", field.node.kind.clone()),
         _ => field.node.clone(),
     };
     let field = &Field { node: &node, ..field.clone() };
@@ -329,7 +329,7 @@ fn check_key(field: &Field, key: &str, machine: &Machine) -> Result<()> {
 fn short(field: &Field, text: &str) -> Result<Node> {
     let plain = text.trim().trim_start_matches(['±', '+', '-']).trim_start_matches(['/', '-']);
     if plain.ends_with('%') && plain.starts_with(|c: char| c.is_ascii_digit() || c == '.') {
-        return Ok(table_of(field.node, "share", Kind::Text(plain.to_string())));
+        return Ok(table_of(field.node, "share", NodeValue::Text(plain.to_string())));
     }
     let wrong = || {
         field.fail(format!("\"{}\" is not a distribution of a parameter", text.trim())).allowed(
@@ -346,16 +346,16 @@ fn short(field: &Field, text: &str) -> Result<Node> {
     }
     let of = |part: &str| {
         let part = part.trim();
-        let kind = part.parse::<f64>().map_or_else(|_| Kind::Text(part.to_string()), Kind::Float);
+        let kind = part.parse::<f64>().map_or_else(|_| NodeValue::Text(part.to_string()), NodeValue::Float);
         Node { span: field.node.span.clone(), kind }
     };
     let values = inside.split(',').filter(|part| !part.trim().is_empty()).map(of).collect();
-    Ok(table_of(field.node, &name, Kind::List(values)))
+    Ok(table_of(field.node, &name, NodeValue::List(values)))
 }
 
 /// A table of one entry where `node` stands.
-fn table_of(node: &Node, key: &str, kind: Kind) -> Node {
+fn table_of(node: &Node, key: &str, kind: NodeValue) -> Node {
     let span = node.span.clone();
     let entry = Entry { key: key.to_string(), key_span: span.clone(), node: Node { span: span.clone(), kind } };
-    Node { span, kind: Kind::Table(vec![entry]) }
+    Node { span, kind: NodeValue::Table(vec![entry]) }
 }

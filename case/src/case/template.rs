@@ -1,6 +1,6 @@
 //! The case that `taut init` writes.
 
-use crate::machine::Kind;
+use crate::machine::MachineKind;
 
 /// A commented case file that runs as it stands.
 pub const TEMPLATE: &str = include_str!("template.toml");
@@ -44,14 +44,14 @@ impl Template {
 ///
 /// ```
 /// use taut::case::{Case, gantry_template};
-/// use taut::machine::Kind;
-/// for kind in [Kind::HFrame, Kind::CoreXy, Kind::DualBelt] {
+/// use taut::machine::MachineKind;
+/// for kind in [MachineKind::HFrame, MachineKind::CoreXy, MachineKind::DualBelt] {
 ///     let case = Case::from_text("gantry.toml", &gantry_template(kind))?;
 ///     assert_eq!(case.machine.kind, kind);
 /// }
 /// # Ok::<(), taut::Error>(())
 /// ```
-pub fn gantry_template(kind: Kind) -> String {
+pub fn gantry_template(kind: MachineKind) -> String {
     const H_FRAME: &str = "\
 #    (O)───┐          ┌───(O)     idlers at the far end
 #     │    │          │    │
@@ -73,28 +73,28 @@ pub fn gantry_template(kind: Kind) -> String {
 #    │ │                       │ │                                      y to the right
 #    (left)               (right)       drive pulleys";
     // An axis has a template of its own.
-    let kind = if kind == Kind::Axis { Kind::CoreXy } else { kind };
-    let others = Kind::ALL.into_iter().filter(|other| ![Kind::Axis, kind].contains(other));
+    let kind = if kind == MachineKind::Axis { MachineKind::CoreXy } else { kind };
+    let others = MachineKind::ALL.into_iter().filter(|other| ![MachineKind::Axis, kind].contains(other));
     let others: Vec<String> = others.map(|other| format!("\"{}\"", other.word())).collect();
     // With three drives the bridge is no part of what one motor does, and both sides have to pull it.
     let moves_both = r#""one motor"                  # moves bridge and cart alike"#;
     let moves_cart = r#""cart alone"                 # on the bridge, which stays where it is"#;
     let (drawing, stiffness, lengths, left, first) = match kind {
-        Kind::HFrame => (
+        MachineKind::HFrame => (
             H_FRAME,
             ["132.76 kN/m", "132.76 kN/m", "58.885 kN/m"].as_slice(),
             ["0.7 m", "0.7 m", "1.6 m"].as_slice(),
             "-5 V",
             ("left", moves_both),
         ),
-        Kind::DualBelt => (
+        MachineKind::DualBelt => (
             DUAL_BELT,
             ["60 kN/m", "130 kN/m", "60 kN/m", "130 kN/m", "90 kN/m", "130 kN/m"].as_slice(),
             ["1.6 m", "0.7 m", "1.6 m", "0.7 m", "1 m", "0.7 m"].as_slice(),
             "5 V",
             ("cart", moves_cart),
         ),
-        Kind::Axis | Kind::CoreXy => (
+        MachineKind::Axis | MachineKind::CoreXy => (
             CORE_XY,
             ["60 kN/m", "130 kN/m", "60 kN/m", "130 kN/m"].as_slice(),
             ["1.6 m", "0.7 m", "1.6 m", "0.7 m"].as_slice(),

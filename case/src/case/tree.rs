@@ -10,11 +10,11 @@ use toml_edit::{Document, Item, Value};
 #[derive(Debug, Clone)]
 pub(super) struct Node {
     pub span: Range<usize>,
-    pub kind: Kind,
+    pub kind: NodeValue,
 }
 
 #[derive(Debug, Clone)]
-pub(super) enum Kind {
+pub(super) enum NodeValue {
     Text(String),
     Integer(i64),
     Float(f64),
@@ -44,7 +44,7 @@ impl Source {
                 .next("give the path of a case file in TOML"));
         }
         let document = Document::parse(text).map_err(|e| syntax(self, &e))?;
-        Ok(Node { span: 0..0, kind: Kind::Table(entries(document.as_table(), 0..0)) })
+        Ok(Node { span: 0..0, kind: NodeValue::Table(entries(document.as_table(), 0..0)) })
     }
 }
 
@@ -110,15 +110,15 @@ fn entries(table: &dyn toml_edit::TableLike, outer: Range<usize>) -> Vec<Entry> 
 
 fn node(item: &Item, key_span: &Range<usize>) -> Node {
     match item {
-        Item::None => Node { span: key_span.clone(), kind: Kind::Table(Vec::new()) },
+        Item::None => Node { span: key_span.clone(), kind: NodeValue::Table(Vec::new()) },
         Item::Value(value) => value_node(value, key_span),
-        Item::Table(table) => Node { span: key_span.clone(), kind: Kind::Table(entries(table, key_span.clone())) },
+        Item::Table(table) => Node { span: key_span.clone(), kind: NodeValue::Table(entries(table, key_span.clone())) },
         Item::ArrayOfTables(tables) => {
             let one = |table: &toml_edit::Table| {
                 let span = table.span().unwrap_or(key_span.clone());
-                Node { kind: Kind::Table(entries(table, span.clone())), span }
+                Node { kind: NodeValue::Table(entries(table, span.clone())), span }
             };
-            Node { span: key_span.clone(), kind: Kind::Tables(tables.iter().map(one).collect()) }
+            Node { span: key_span.clone(), kind: NodeValue::Tables(tables.iter().map(one).collect()) }
         }
     }
 }
@@ -126,29 +126,29 @@ fn node(item: &Item, key_span: &Range<usize>) -> Node {
 fn value_node(value: &Value, outer: &Range<usize>) -> Node {
     let span = value.span().unwrap_or(outer.clone());
     let kind = match value {
-        Value::String(text) => Kind::Text(text.value().clone()),
-        Value::Integer(number) => Kind::Integer(*number.value()),
-        Value::Float(number) => Kind::Float(*number.value()),
-        Value::Boolean(flag) => Kind::Bool(*flag.value()),
-        Value::Datetime(_) => Kind::Date,
-        Value::Array(list) => Kind::List(list.iter().map(|v| value_node(v, &span)).collect()),
-        Value::InlineTable(table) => Kind::Table(entries(table, span.clone())),
+        Value::String(text) => NodeValue::Text(text.value().clone()),
+        Value::Integer(number) => NodeValue::Integer(*number.value()),
+        Value::Float(number) => NodeValue::Float(*number.value()),
+        Value::Boolean(flag) => NodeValue::Bool(*flag.value()),
+        Value::Datetime(_) => NodeValue::Date,
+        Value::Array(list) => NodeValue::List(list.iter().map(|v| value_node(v, &span)).collect()),
+        Value::InlineTable(table) => NodeValue::Table(entries(table, span.clone())),
     };
     Node { span, kind }
 }
 
-impl Kind {
+impl NodeValue {
     /// Its kind, for messages.
     pub fn word(&self) -> &'static str {
         match self {
-            Kind::Text(_) => "a text",
-            Kind::Integer(_) | Kind::Float(_) => "a number",
-            Kind::Bool(true) => "true",
-            Kind::Bool(false) => "false",
-            Kind::Date => "a date or a time of day",
-            Kind::List(_) => "a list",
-            Kind::Tables(_) => "a list of tables",
-            Kind::Table(_) => "a table",
+            NodeValue::Text(_) => "a text",
+            NodeValue::Integer(_) | NodeValue::Float(_) => "a number",
+            NodeValue::Bool(true) => "true",
+            NodeValue::Bool(false) => "false",
+            NodeValue::Date => "a date or a time of day",
+            NodeValue::List(_) => "a list",
+            NodeValue::Tables(_) => "a list of tables",
+            NodeValue::Table(_) => "a table",
         }
     }
 }

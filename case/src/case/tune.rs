@@ -4,7 +4,7 @@
 use super::Move;
 use super::reader::{Field, Table};
 use super::suggestion;
-use super::tree::Kind;
+use super::tree::NodeValue;
 use crate::design::{Design, Structure, Tunable, TunedBy};
 use crate::error::Result;
 use crate::machine::Machine;
@@ -201,8 +201,8 @@ pub(super) fn known(root: &Table) -> Result<Vec<Known>> {
         let number = |key: &str| match row.optional(key) {
             None => Ok(None),
             Some(field) => match field.node.kind {
-                Kind::Float(value) if value.is_finite() => Ok(Some(value)),
-                Kind::Integer(value) => Ok(Some(value as f64)),
+                NodeValue::Float(value) if value.is_finite() => Ok(Some(value)),
+                NodeValue::Integer(value) => Ok(Some(value as f64)),
                 _ => Err(field
                     .fail("this is no finite number in SI units")
                     .next("leave the table as `taut fit` wrote it, or take it out")),

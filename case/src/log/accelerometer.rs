@@ -3,7 +3,7 @@
 use super::formats;
 use super::lines::{Lines, open};
 use super::sheet::{ColumnId, Request, Sheet};
-use crate::error::{Error, Place, Result};
+use crate::error::{Error, Result, SourceLocation};
 use crate::quantity::rounded;
 use std::path::Path;
 
@@ -81,7 +81,7 @@ pub fn read_accelerometer(file: &Path) -> Result<Accelerometer> {
 /// The line that names the columns.
 struct Heading {
     text: String,
-    place: Place,
+    place: SourceLocation,
 }
 
 impl Heading {
@@ -91,7 +91,7 @@ impl Heading {
         let names = |text: &str| ["accel", "psd"].iter().any(|word| text.to_lowercase().contains(word));
         // A remark names them where the first line has numbers already.
         if there && !names(&lines.text) && names(&lines.remark) {
-            return Ok(Self { text: lines.remark.clone(), place: Place::file(file) });
+            return Ok(Self { text: lines.remark.clone(), place: SourceLocation::file(file) });
         }
         if !there {
             let what = if lines.number == 0 { "the file is empty" } else { "the file has no rows" };

@@ -17,14 +17,14 @@ const MOST: usize = 64;
 #[derive(Debug, Clone)]
 pub struct Looked {
     /// Its columns, in the file's order.
-    pub columns: Vec<Seen>,
+    pub columns: Vec<FileColumn>,
     /// Their likely meaning.
     pub guess: Guess,
 }
 
 /// A column of a file.
 #[derive(Debug, Clone)]
-pub struct Seen {
+pub struct FileColumn {
     /// By its name, or by its place where nothing names it.
     pub id: ColumnId,
     /// The unit that the file states.
@@ -80,7 +80,7 @@ pub fn look(file: &Path) -> Result<Looked> {
         Err(_) => {
             let one = |id: &ColumnId| {
                 let alone = read(file, std::slice::from_ref(id)).ok().and_then(|mut read| read.pop());
-                alone.unwrap_or(Seen { id: id.clone(), unit: None, values: Vec::new() })
+                alone.unwrap_or(FileColumn { id: id.clone(), unit: None, values: Vec::new() })
             };
             ids.iter().map(one).collect()
         }
@@ -93,17 +93,17 @@ pub fn look(file: &Path) -> Result<Looked> {
     Ok(Looked { columns, guess })
 }
 
-fn read(file: &Path, ids: &[ColumnId]) -> Result<Vec<Seen>> {
+fn read(file: &Path, ids: &[ColumnId]) -> Result<Vec<FileColumn>> {
     let preset = PRESETS.iter().find(|preset| preset.is_messages);
     let request = Request { complete: 0, units_row: true, preset, ..Request::complete(ids) };
     let mut sheet = formats::read(file, &request)?;
     let columns = std::mem::take(&mut sheet.columns);
     let all = ids.iter().zip(sheet.units).zip(columns);
-    Ok(all.map(|((id, unit), values)| Seen { id: id.clone(), unit, values }).collect())
+    Ok(all.map(|((id, unit), values)| FileColumn { id: id.clone(), unit, values }).collect())
 }
 
 /// By a preset whose columns are there, else by names.
-fn guess(file: &Path, columns: &[Seen]) -> Guess {
+fn guess(file: &Path, columns: &[FileColumn]) -> Guess {
     let mut guess =
         PRESETS.iter().find_map(|preset| of_preset(preset, file, columns)).unwrap_or_else(|| by_name(columns));
     guess.split = guess.column("time").and_then(|time| split(&columns[time].values, time, columns));
@@ -111,7 +111,7 @@ fn guess(file: &Path, columns: &[Seen]) -> Guess {
 }
 
 /// The mapping of a preset, where the file has its clock and something that it measures.
-fn of_preset(preset: &'static Preset, file: &Path, columns: &[Seen]) -> Option<Guess> {
+fn of_preset(preset: &'static Preset, file: &Path, columns: &[FileColumn]) -> Option<Guess> {
     let place = |id: &ColumnId| columns.iter().position(|column| column.id == *id);
     let mut known = Vec::new();
     for (key, id, of) in preset.columns_of(file).ok()? {
@@ -126,9 +126,9 @@ fn of_preset(preset: &'static Preset, file: &Path, columns: &[Seen]) -> Option<G
     found.then_some(Guess { preset: Some(preset.name), columns: known, split: None })
 }
 
-fn by_name(columns: &[Seen]) -> Guess {
+fn by_name(columns: &[FileColumn]) -> Guess {
     let mut guess = Guess::default();
-    let clock = |column: &Seen| rises(&column.values) && rank(&words(column), CLOCKS).is_some();
+    let clock = |column: &FileColumn| rises(&column.values) && rank(&words(column), CLOCKS).is_some();
     let first = columns.iter().position(clock).or_else(|| columns.iter().position(|column| rises(&column.values)));
     if let Some(place) = first {
         guess.columns.push(("time", place, unit(&columns[place], "s").or_else(|| by_step(&columns[place]))));
@@ -153,19 +153,19 @@ fn by_name(columns: &[Seen]) -> Guess {
 }
 
 /// True if a column can be of a quantity with this unit: the unit that its file states, if one, has the same dimension.
-fn is_of(column: &Seen, wanted: &str) -> bool {
+fn is_of(column: &FileColumn, wanted: &str) -> bool {
     let dimension = |unit: &str| conversion(unit).map(|(dimension, _)| dimension.without_angle()).ok();
     column.unit.as_deref().and_then(dimension).is_none_or(|own| Some(own) == dimension(wanted))
 }
 
 /// The unit that a column's name ends in, where the file states none.
-fn unit(column: &Seen, wanted: &str) -> Option<String> {
+fn unit(column: &FileColumn, wanted: &str) -> Option<String> {
     let name = column.id.name().filter(|_| column.unit.is_none())?;
     suspected(name, wanted).map(str::to_string)
 }
 
 /// Unit of a clock whose header names none, from the step between rows: recorders sample every 10 µs to 0.1 s.
-fn by_step(column: &Seen) -> Option<String> {
+fn by_step(column: &FileColumn) -> Option<String> {
     if column.unit.is_some() {
         return None;
     }
@@ -177,7 +177,7 @@ fn by_step(column: &Seen) -> Option<String> {
 }
 
 /// A name in lower case, what is between brackets left out, and the words that it is made of.
-fn words(column: &Seen) -> Vec<String> {
+fn words(column: &FileColumn) -> Vec<String> {
     let name = column.id.name().unwrap_or_default().to_lowercase();
     let name = name.split(['[', '(']).next().unwrap_or_default().trim().to_string();
     let mut words: Vec<String> = name.split(|c: char| !c.is_alphanumeric()).map(str::to_string).collect();
@@ -204,11 +204,11 @@ fn rises(values: &[f64]) -> bool {
 const PAUSE: f64 = 10.0;
 
 /// The column that changes where the clock goes back or pauses, and nowhere else.
-fn split(time: &[f64], clock: usize, columns: &[Seen]) -> Option<usize> {
+fn split(time: &[f64], clock: usize, columns: &[FileColumn]) -> Option<usize> {
     let pause = PAUSE * usual_step(time)?;
     let parts = |k: usize| time[k] <= time[k - 1] || time[k] - time[k - 1] > pause;
     let seams: Vec<usize> = (1..time.len()).filter(|&k| parts(k)).collect();
-    let tells = |column: &Seen| {
+    let tells = |column: &FileColumn| {
         let values = &column.values;
         let changes = (1..values.len()).filter(|&k| values[k].to_bits() != values[k - 1].to_bits());
         values.len() == time.len() && changes.eq(seams.iter().copied())

@@ -1,6 +1,6 @@
 //! The lines of a text file, one at a time and of bounded length, and their fields.
 
-use crate::error::{Error, Place, Result};
+use crate::error::{Error, Result, SourceLocation};
 use crate::files::Source;
 use std::io::{self, BufRead, BufReader, Read};
 use std::ops::Range;
@@ -232,8 +232,8 @@ impl<'a, R: BufRead> Lines<'a, R> {
     }
 
     /// The bytes `range` of the current line.
-    pub fn place(&self, range: Range<usize>) -> Place {
-        let mut place = Place::in_text(self.file, &self.text, range);
+    pub fn place(&self, range: Range<usize>) -> SourceLocation {
+        let mut place = SourceLocation::in_text(self.file, &self.text, range);
         if let Some(span) = &mut place.span {
             span.line = self.number;
         }

@@ -1,7 +1,7 @@
 //! Where the fields of a text file stand, for messages about them.
 
 use super::lines::{Fields, Lines, open};
-use crate::error::Place;
+use crate::error::SourceLocation;
 use std::path::Path;
 
 /// The place of a field in a file.
@@ -16,7 +16,7 @@ pub(super) struct Locator {
 
 impl Locator {
     /// The field of the i-th wanted column in a line.
-    pub fn place(&self, file: &Path, line: usize, i: usize) -> Option<Place> {
+    pub fn place(&self, file: &Path, line: usize, i: usize) -> Option<SourceLocation> {
         let mut lines = Lines::new(file, open(file).ok()?);
         while lines.number < line {
             lines.advance().ok().filter(|there| *there)?;
@@ -26,7 +26,7 @@ impl Locator {
     }
 
     /// The name of the i-th wanted column.
-    pub fn heading(&self, file: &Path, i: usize) -> Option<Place> {
+    pub fn heading(&self, file: &Path, i: usize) -> Option<SourceLocation> {
         self.place(file, self.heading?, i)
     }
 }

@@ -1,7 +1,7 @@
 //! From a file's columns to logs: what each column is, in which unit, and which rows belong to which run.
 
 use super::presets::Preset;
-use super::sheet::{ColumnId, Dialect, Filter, Request, Run, Sheet};
+use super::sheet::{ColumnId, Dialect, Filter, LabelledRows, Request, Sheet};
 use super::words::{count, shown};
 use super::{Log, Output, Quantity, formats};
 use crate::error::{Error, Result};
@@ -300,7 +300,7 @@ impl Columns<'_> {
     }
 
     /// The log in these rows.
-    fn log(&self, rows: Range<usize>, run: Option<&Run>) -> Result<Log> {
+    fn log(&self, rows: Range<usize>, run: Option<&LabelledRows>) -> Result<Log> {
         let mapping = self.mapping;
         let time = match &mapping.time {
             Clock::Column(_) => self.times(rows.clone())?,
@@ -374,7 +374,7 @@ impl Columns<'_> {
         Ok(log)
     }
 
-    fn in_what(&self, run: Option<&Run>) -> String {
+    fn in_what(&self, run: Option<&LabelledRows>) -> String {
         let run = run.map(|run| format!(" in the run {}", shown(&run.label))).unwrap_or_default();
         let window = self.mapping.from.is_some() || self.mapping.to.is_some();
         format!("{run}{}", if window { " between `from` and `to`" } else { "" })
@@ -466,7 +466,7 @@ impl Columns<'_> {
     }
 
     /// The rows between `from` and `to`, counted within the run.
-    fn window(&self, time: &[f64], zero: f64, rows: &Range<usize>, run: Option<&Run>) -> Result<Range<usize>> {
+    fn window(&self, time: &[f64], zero: f64, rows: &Range<usize>, run: Option<&LabelledRows>) -> Result<Range<usize>> {
         let &Mapping { from, to, ref inputs, ref file, .. } = self.mapping;
         let fail = |what: String| Error::new(what).in_file(file);
         let (first, last) = (time.first().copied().unwrap_or_default(), time.last().copied().unwrap_or_default());

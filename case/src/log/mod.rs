@@ -20,7 +20,7 @@ mod words;
 pub use crate::machine::Quantity;
 pub use crate::plan::{Log, Output};
 pub use accelerometer::{Accelerometer, read_accelerometer};
-pub use guess::{Guess, Looked, Seen, look};
+pub use guess::{FileColumn, Guess, Looked, look};
 pub use mapping::{Clock, Fed, Mapping, Source, Unit};
 pub use presets::{End, In, PRESETS, Pick, Preset};
 pub use sheet::{ColumnId, Dialect, Filter};

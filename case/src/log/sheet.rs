@@ -132,7 +132,7 @@ pub(super) struct Sheet {
     /// The number of each row in its file, from 1: in a text file that of its line.
     pub rows: Vec<usize>,
     /// The runs, in the file's order.
-    pub runs: Vec<Run>,
+    pub runs: Vec<LabelledRows>,
     /// In a text file, what it takes to find a field again.
     pub fields: Option<Locator>,
     /// The values seen in the column of the filter, a few of them.
@@ -143,7 +143,7 @@ pub(super) struct Sheet {
 
 /// Rows one after another with the same value in the column that tells runs apart.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Run {
+pub(super) struct LabelledRows {
     pub label: String,
     /// Its first row, counted among the rows that were read.
     pub begin: usize,
@@ -203,7 +203,7 @@ impl Sheet {
     /// Of a row that will follow.
     pub fn note_run(&mut self, label: &str) {
         if self.runs.last().is_none_or(|run| run.label != label) {
-            self.runs.push(Run { label: label.to_string(), begin: self.rows.len() });
+            self.runs.push(LabelledRows { label: label.to_string(), begin: self.rows.len() });
         }
     }
 

@@ -4,7 +4,7 @@ use super::values::{amperes, channel, count, count_or_none, delay, length, metre
 use crate::common::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
-use taut::fit::experiment_design::{Criterion, Kind as InputKind, VERIFIED};
+use taut::fit::experiment_design::{Criterion, Excitation, VERIFIED};
 use taut::machine::Channel;
 
 /// Check which [fit] parameters the logs of a case determine.
@@ -185,13 +185,13 @@ pub enum InputName {
 
 impl InputName {
     /// For the library.
-    pub fn kind(self) -> InputKind {
+    pub fn kind(self) -> Excitation {
         match self {
-            Self::Trapezoid => InputKind::Trapezoid,
-            Self::Sweep => InputKind::Sweep,
-            Self::Chirp => InputKind::Chirp,
-            Self::Multisine => InputKind::Multisine,
-            Self::Prbs => InputKind::Prbs,
+            Self::Trapezoid => Excitation::Trapezoid,
+            Self::Sweep => Excitation::Sweep,
+            Self::Chirp => Excitation::Chirp,
+            Self::Multisine => Excitation::Multisine,
+            Self::Prbs => Excitation::Prbs,
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::common::Common;
 use clap::ValueEnum;
 use std::path::PathBuf;
 use taut::machine::Machine;
-use taut::solve::{Choice, Kind as SolverKind, Method, Solver};
+use taut::solve::{Choice, Method, Solver, SolverKind};
 
 /// Run the experiments of a case file.
 ///

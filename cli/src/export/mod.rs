@@ -11,7 +11,7 @@ use crate::terminal;
 use clap::ValueEnum;
 use std::fmt::Write;
 use taut::case::{Case, Files};
-use taut::export::{self, Exported, Options, Part, Place, Real, Target};
+use taut::export::{self, Destination, Exported, Options, Part, Real, Target};
 use taut::files::{Claim, Inputs, write_atomically};
 use taut::json;
 use taut::{Error, Result};
@@ -53,7 +53,7 @@ pub fn run(args: &Args) -> Outcome {
         true => "axis".to_string(),
         false => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
     };
-    let place = common.out.as_deref().map(|out| Place::of(out, target.ending(), &own));
+    let place = common.out.as_deref().map(|out| Destination::of(out, target.ending(), &own));
     let stem = place.as_ref().map_or(&own, |place| &place.stem);
     let inputs = folder::inputs(path, &case.files);
     let target_at = place.as_ref().map(|place| claimed(place, target, &inputs)).transpose()?;
@@ -85,7 +85,7 @@ enum At {
 }
 
 /// Claims the place before the work.
-fn claimed(place: &Place, target: TargetName, inputs: &Inputs) -> std::result::Result<At, Failure> {
+fn claimed(place: &Destination, target: TargetName, inputs: &Inputs) -> std::result::Result<At, Failure> {
     let ending = target.ending();
     match place.is_file {
         true => Ok(At::File(folder::noted(place.claim(ending)?))),

@@ -11,12 +11,12 @@ use crate::terminal::bold;
 use std::fmt::Write;
 use std::time::Instant;
 use taut::case::{Case, Plan};
-use taut::fit::compare::{Comparison, FrictionLaw, Setting, compare};
+use taut::fit::compare::{Comparison, ComparisonOptions, FrictionLaw, compare};
 use taut::json;
 use taut::solve::Flow;
 use taut::{Error, Result};
 use taut_report::fit::compare::{HEADINGS, rows, section};
-use taut_report::fit::{Found, page_with};
+use taut_report::fit::{FitResults, page_with};
 
 /// Compares, fits with the best, writes, tells.
 pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
@@ -40,7 +40,7 @@ pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
         }
         (found, _) => found?,
     };
-    let found = Found { fit: compared.fit.clone(), profiles: Vec::new(), drawn: None };
+    let found = FitResults { fit: compared.fit.clone(), profiles: Vec::new(), drawn: None };
     let json = json::comparison(&compared);
     let own = &compared.case;
     let text = format!("{}{}", shown(&compared), table::text(own, &found, begin.elapsed()));
@@ -64,8 +64,8 @@ pub fn run(args: &Args, case: &Case, plan: &Plan) -> Outcome {
 }
 
 /// The laws and windows that are asked for.
-fn setting(args: &Args, case: &Case, plan: &Plan) -> Result<Setting> {
-    let mut setting = Setting::usual(case, plan);
+fn setting(args: &Args, case: &Case, plan: &Plan) -> Result<ComparisonOptions> {
+    let mut setting = ComparisonOptions::usual(case, plan);
     if !args.laws.is_empty() {
         let laws = args.laws.iter().map(|name| FrictionLaw::named(name).map_err(|error| error.in_file("--laws")));
         setting.laws = laws.collect::<Result<_>>()?;

@@ -18,7 +18,7 @@ use taut::fit::{Ending, Fit, Posterior, fit, profiles};
 use taut::json;
 use taut::solve::Flow;
 use taut::trajectory::CsvWriter;
-use taut_report::fit::{Found, page};
+use taut_report::fit::{FitResults, page};
 
 /// Reads the case, fits, writes, tells.
 pub fn run(args: &Args) -> Outcome {
@@ -85,7 +85,7 @@ fn led(text: &str, args: &Args, folder: &Folder) -> Result<String> {
 }
 
 /// How it ended.
-fn status(found: &Found, interrupt: &Interrupt) -> Status {
+fn status(found: &FitResults, interrupt: &Interrupt) -> Status {
     match (interrupt.signal(), found.fit.ending) {
         (Some(signal), _) => Status::Interrupted(signal),
         (None, _) if found.drawn.as_ref().is_some_and(|drawn| !drawn.doubts().is_empty()) => Status::Incomplete,
@@ -97,7 +97,7 @@ fn status(found: &Found, interrupt: &Interrupt) -> Status {
 
 /// The search, then profiles and draws where they are wanted; Ctrl-C leaves out the rest. None where it came before any
 /// result.
-fn find(args: &Args, case: &Case, plan: &Plan, interrupt: &Interrupt) -> Result<Option<Found>> {
+fn find(args: &Args, case: &Case, plan: &Plan, interrupt: &Interrupt) -> Result<Option<FitResults>> {
     let (common, is_stopped) = (&args.common, || interrupt.signal().is_some());
     let (progress, mut steps) = (Progress::new("simulating the logs", None, common.quiet), 0);
     let fit = fit(case, plan, Some(&is_stopped), &mut |cost| {
@@ -126,7 +126,7 @@ fn find(args: &Args, case: &Case, plan: &Plan, interrupt: &Interrupt) -> Result<
         },
         false => None,
     };
-    Ok(Some(Found { fit, profiles, drawn }))
+    Ok(Some(FitResults { fit, profiles, drawn }))
 }
 
 /// The files that will be written.

@@ -6,10 +6,10 @@ use std::fmt::Write;
 use std::time::Duration;
 use taut::case::Case;
 use taut::number;
-use taut_report::fit::{Found, crooked, ending, findings, past_kinks, scores, value, words};
+use taut_report::fit::{FitResults, crooked, ending, findings, past_kinks, scores, value, words};
 
 /// The text on the terminal.
-pub fn text(case: &Case, found: &Found, took: Duration) -> String {
+pub fn text(case: &Case, found: &FitResults, took: Duration) -> String {
     let fit = &found.fit;
     let mut text = format!("{}\n", bold(&case.title));
     let _ = writeln!(text, "{}", ending(fit));

@@ -2,7 +2,7 @@
 
 use crate::terminal::bold;
 use std::fmt::Write;
-use taut::linear::{Analysis, ByInput, Discrete, Natural, Place, ResonanceMap, Root};
+use taut::linear::{Analysis, ByInput, Discrete, Natural, ResonanceMap, ResonancesAt, Root};
 use taut::number::{engineering_typed, fixed, typed};
 use taut_report::modes::{elastic, gain, pole, rigid, where_it_matters, words, z, zeros};
 use taut_report::simulate::machine;
@@ -97,7 +97,7 @@ fn outputs(text: &mut String, one: &ByInput, several: bool) {
 fn travel(text: &mut String, analysis: &Analysis) {
     let held = if analysis.case.machine.bridge.is_some() { "drives held" } else { "anti-resonance" };
     let _ = writeln!(text, "  {:>12}  {:<28}{held:<28}without damping", "position", "resonance");
-    let rows: Vec<&Place> = match &analysis.travel {
+    let rows: Vec<&ResonancesAt> = match &analysis.travel {
         Some(travel) => {
             let step = (travel.len() - 1).div_ceil(ROWS - 1).max(1);
             travel.iter().step_by(step).collect()

@@ -13,7 +13,7 @@ pub struct Claim {
     /// Its name, for ever.
     pub id: &'static str,
     /// Kind of statement.
-    pub kind: Kind,
+    pub kind: ClaimSource,
     /// Section, figure, table or equation.
     pub source: &'static str,
     /// The statement: the paper's, short.
@@ -29,7 +29,7 @@ pub struct Claim {
 /// Whose statement it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Kind {
+pub enum ClaimSource {
     /// A sentence of the paper.
     Statement,
     /// A number, an equation or a program as printed.
@@ -122,7 +122,7 @@ impl Verdict {
 
 impl Claim {
     /// A claim without numbers yet.
-    pub fn new(id: &'static str, kind: Kind, source: &'static str, statement: &'static str) -> Self {
+    pub fn new(id: &'static str, kind: ClaimSource, source: &'static str, statement: &'static str) -> Self {
         Self { id, kind, source, statement, checks: Vec::new(), found: String::new(), remark: String::new() }
     }
 
@@ -169,7 +169,7 @@ impl Claim {
 #[derive(Serialize)]
 struct Entry<'a> {
     id: &'a str,
-    kind: Kind,
+    kind: ClaimSource,
     source: &'a str,
     statement: &'a str,
     value: Option<f64>,
@@ -234,7 +234,7 @@ mod tests {
     use super::*;
 
     fn claim() -> Claim {
-        Claim::new("x", Kind::Statement, "section 0", "\"x\"")
+        Claim::new("x", ClaimSource::Statement, "section 0", "\"x\"")
     }
 
     #[test]

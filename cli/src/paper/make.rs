@@ -1,6 +1,6 @@
 //! The paper's sentences and numbers about what the stage is made of (sections 2.2 and 2.3).
 
-use super::claims::{Claim, Kind::Statement, MINOR, NOT_APPRECIABLE, Rule};
+use super::claims::{Claim, ClaimSource::Statement, MINOR, NOT_APPRECIABLE, Rule};
 use super::findings::Findings;
 use super::words::{percent, share, si};
 

@@ -24,7 +24,7 @@ use crate::command::{Finished, Report};
 use crate::common::Common;
 use crate::failure::{Failure, Outcome};
 use crate::folder::Folder;
-use claims::{Claim, Kind, Verdict};
+use claims::{Claim, ClaimSource, Verdict};
 use findings::Findings;
 use plots::Plot;
 use rayon::prelude::*;
@@ -106,10 +106,10 @@ fn table(claims: &[Claim]) -> String {
         String::from("Sollmann & Jouaneh, Dynamic modelling of a single-axis belt-drive system (2011), recomputed\n\n");
     let width = claims.iter().map(|c| c.id.len()).max().unwrap_or(0);
     let groups = [
-        (Kind::Statement, "Statements of the paper"),
-        (Kind::Print, "Printed equations and values"),
-        (Kind::Reading, "Results of a close reading"),
-        (Kind::Reference, "Independent solutions"),
+        (ClaimSource::Statement, "Statements of the paper"),
+        (ClaimSource::Print, "Printed equations and values"),
+        (ClaimSource::Reading, "Results of a close reading"),
+        (ClaimSource::Reference, "Independent solutions"),
     ];
     for (kind, heading) in groups {
         text += &format!("{heading}\n");

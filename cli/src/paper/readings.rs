@@ -1,6 +1,6 @@
 //! Misprints of the paper, and the results of a close reading (P1 to P10).
 
-use super::claims::{Claim, Kind, Rule};
+use super::claims::{Claim, ClaimSource, Rule};
 use super::findings::Findings;
 use super::model::Change;
 use super::studies::{From, largest};
@@ -312,11 +312,11 @@ fn mode(f: &Findings, index: usize) -> f64 {
 }
 
 fn print(id: &'static str, source: &'static str, statement: &'static str) -> Claim {
-    Claim::new(id, Kind::Print, source, statement)
+    Claim::new(id, ClaimSource::Print, source, statement)
 }
 
 fn reading(id: &'static str, source: &'static str, statement: &'static str) -> Claim {
-    Claim::new(id, Kind::Reading, source, statement)
+    Claim::new(id, ClaimSource::Reading, source, statement)
 }
 
 fn near(expected: f64, tolerance: f64) -> Rule {

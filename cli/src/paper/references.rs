@@ -1,13 +1,13 @@
 //! Numbers of independent solutions, to hold this run against.
 
-use super::claims::{Claim, Kind, Rule};
+use super::claims::{Claim, ClaimSource, Rule};
 use super::findings::Findings;
 use super::model::Response;
 
 /// Numbers of independent high-precision solutions.
 pub fn references(f: &Findings) -> Vec<Claim> {
     let number = |id, statement, value: f64, unit, expected: f64, tolerance: f64| {
-        Claim::new(id, Kind::Reference, "independent solution", statement).decide(
+        Claim::new(id, ClaimSource::Reference, "independent solution", statement).decide(
             "this run",
             value,
             unit,

@@ -1,6 +1,6 @@
 //! The report: what holds and what does not, then the paper from its first figure to its last.
 
-use super::claims::{Claim, Kind, Verdict};
+use super::claims::{Claim, ClaimSource, Verdict};
 use super::findings::Findings;
 use super::misprints::MISPRINTS;
 use super::plots::Plot;
@@ -74,10 +74,10 @@ impl Report<'_> {
 
     fn summary(&mut self) {
         let f = self.f;
-        let of = |verdict: Verdict, kinds: &[Kind]| {
+        let of = |verdict: Verdict, kinds: &[ClaimSource]| {
             self.claims.iter().filter(|c| kinds.contains(&c.kind) && c.verdict() == verdict).count()
         };
-        let own = [Kind::Statement, Kind::Print];
+        let own = [ClaimSource::Statement, ClaimSource::Print];
         let all: usize = Verdict::ALL.into_iter().map(|v| of(v, &own)).sum();
         let count = |v| of(v, &own);
         let linear = |change, factor| f.runs.one(From::Table1, change, factor, 5.0);
@@ -361,7 +361,7 @@ impl Report<'_> {
 
     fn method(&mut self) {
         let f = self.f;
-        let golden = self.claims.iter().filter(|c| c.kind == Kind::Reference);
+        let golden = self.claims.iter().filter(|c| c.kind == ClaimSource::Reference);
         let (right, all) =
             golden.fold((0, 0), |(right, all), c| (right + usize::from(c.verdict() == Verdict::Confirmed), all + 1));
         self.page.prose(format!(

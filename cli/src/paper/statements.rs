@@ -3,7 +3,7 @@
 //! The meaning of the paper's words, once for all: "by far" is five times, "minor" and "marginal" less than a tenth,
 //! "not appreciable" less than a hundredth, "the same" less than a thousandth.
 
-use super::claims::{Claim, Kind::Statement, MINOR, NOT_APPRECIABLE, Rule};
+use super::claims::{Claim, ClaimSource::Statement, MINOR, NOT_APPRECIABLE, Rule};
 use super::findings::Findings;
 use super::model::{Change, VOLTS};
 use super::studies::{Effect, FACTORS, From, largest, smallest};

@@ -2,7 +2,7 @@
 
 use crate::terminal::bold;
 use std::fmt::Write;
-use taut::control::recommendation::{Findings, Found};
+use taut::control::recommendation::{Findings, ShaperFile};
 use taut_report::shape::{mode_words, pair_words, remark, words};
 
 /// The text on the terminal.
@@ -42,7 +42,7 @@ pub fn text(found: &Findings) -> String {
     text
 }
 
-fn shapers(text: &mut String, one: &Found) {
+fn shapers(text: &mut String, one: &ShaperFile) {
     text.push_str("  shaper    frequency  vibration  smoothing  acceleration up to\n");
     for fitted in &one.choice.fitted {
         let [frequency, vibration, smoothing, acceleration] = words(fitted);
@@ -56,7 +56,7 @@ fn shapers(text: &mut String, one: &Found) {
 }
 
 /// Modes along the travel and what is left of them at worst.
-fn modes(text: &mut String, one: &Found) {
+fn modes(text: &mut String, one: &ShaperFile) {
     let all = one.left();
     if all.is_empty() {
         return;
@@ -74,7 +74,7 @@ fn modes(text: &mut String, one: &Found) {
     }
 }
 
-fn pairs(text: &mut String, one: &Found) {
+fn pairs(text: &mut String, one: &ShaperFile) {
     let Some(told) = one.pair_told() else { return };
     let _ = writeln!(text, "{}\n{told}", bold("Pairs"));
     for pair in &one.choice.pairs {

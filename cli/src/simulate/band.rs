@@ -1,6 +1,6 @@
 //! Runs of the machines drawn from a posterior: the band that 95 % of them stay in, at every time for itself.
 
-use super::setting::Setting;
+use super::setting::RunSettings;
 use rayon::prelude::*;
 use taut::case::Experiment;
 use taut::chance::quantile;
@@ -41,7 +41,7 @@ pub fn chosen(mut machines: Vec<Machine>, count: usize) -> Vec<Machine> {
 }
 
 /// Runs the experiment with each machine, on all processors; none where it was interrupted.
-pub fn of(setting: &Setting, machines: &[Machine], experiment: &Experiment) -> Result<Option<Band>> {
+pub fn of(setting: &RunSettings, machines: &[Machine], experiment: &Experiment) -> Result<Option<Band>> {
     let every = experiment.samples().div_ceil(ROWS).max(1) as usize;
     let runs: Vec<Option<[Vec<f64>; 4]>> =
         machines.par_iter().map(|machine| run(setting, machine, experiment, every)).collect::<Result<_>>()?;
@@ -60,7 +60,7 @@ pub fn of(setting: &Setting, machines: &[Machine], experiment: &Experiment) -> R
 }
 
 /// Writes it; returns the file's name.
-pub fn write(band: &Band, setting: &Setting, experiment: &Experiment) -> Result<Option<String>> {
+pub fn write(band: &Band, setting: &RunSettings, experiment: &Experiment) -> Result<Option<String>> {
     let Some(folder) = setting.folder else { return Ok(None) };
     let mut columns = vec![Column { values: band.time.clone(), ..Column::new("time", "s") }];
     for ((name, unit, _), values) in QUANTITIES.iter().zip(&band.values) {
@@ -76,7 +76,12 @@ pub fn write(band: &Band, setting: &Setting, experiment: &Experiment) -> Result<
 }
 
 /// Time and quantities of one machine, every so many rows; none where it does not reach the end.
-fn run(setting: &Setting, machine: &Machine, experiment: &Experiment, every: usize) -> Result<Option<[Vec<f64>; 4]>> {
+fn run(
+    setting: &RunSettings,
+    machine: &Machine,
+    experiment: &Experiment,
+    every: usize,
+) -> Result<Option<[Vec<f64>; 4]>> {
     let mut columns: [Vec<f64>; 4] = Default::default();
     let mut row = 0;
     let outcome = solve::stream(machine, experiment, setting.solver, &mut |block| {

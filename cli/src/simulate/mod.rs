@@ -12,7 +12,7 @@ use crate::failure::{Failure, Outcome, Status};
 use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use crate::terminal;
-use setting::Setting;
+use setting::RunSettings;
 use std::ffi::OsString;
 use std::path::Path;
 use taut::case::{Case, Files};
@@ -21,7 +21,7 @@ use taut::json::{self, Simulation};
 use taut::machine::Machine;
 use taut::solve::{self, Ending, Solver};
 use taut::{Error, Result};
-use taut_report::simulate::{Run, early_end, hidden, report, yawed};
+use taut_report::simulate::{SimulatedExperiment, early_end, hidden, report, yawed};
 
 /// How to keep the result.
 const ADVICE: &str = "add --out DIR for files and a report; `taut studio CASE` shows it in motion";
@@ -93,7 +93,8 @@ fn simulate(args: &Simulate, path: &Path, case: &Case) -> Outcome {
     let files = names(args, folder::brought(&case.files).into_values(), experiments.iter().map(|one| one.file_name()));
     let folder = Folder::wanted(common, inputs, files)?;
     let interrupt = Interrupt::listen();
-    let setting = Setting { args, case, solver, folder: folder.as_ref(), interrupt: &interrupt, machines: &machines };
+    let setting =
+        RunSettings { args, case, solver, folder: folder.as_ref(), interrupt: &interrupt, machines: &machines };
 
     let mut runs = Vec::new();
     for experiment in experiments {
@@ -102,7 +103,7 @@ fn simulate(args: &Simulate, path: &Path, case: &Case) -> Outcome {
             break;
         }
     }
-    let told: Vec<_> = runs.iter().map(Run::told).collect();
+    let told: Vec<_> = runs.iter().map(SimulatedExperiment::told).collect();
     let json = ("summary.json", json::text(&Simulation::new(case, solver, &told)));
     let mut finished = Finished::new("simulate", json, table::text(case, solver, &runs), ADVICE);
     if let Some(folder) = &folder {

@@ -2,7 +2,7 @@
 
 use super::band;
 use super::rows::writers;
-use super::setting::Setting;
+use super::setting::RunSettings;
 use crate::failure::Failure;
 use crate::folder::Folder;
 use crate::progress::Progress;
@@ -15,11 +15,11 @@ use taut::metrics::Meter;
 use taut::reduction::Reduction;
 use taut::solve::{self, ErrorEstimate, Flow, Solver};
 use taut::trajectory::{CsvWriter, Trajectory};
-use taut_report::simulate::{Curves, Run, Samples};
+use taut_report::simulate::{Curves, Samples, SimulatedExperiment};
 
-impl<'a> Setting<'a> {
+impl<'a> RunSettings<'a> {
     /// Runs `experiment`.
-    pub fn run(&self, experiment: &'a Experiment) -> std::result::Result<Run<'a>, Failure> {
+    pub fn run(&self, experiment: &'a Experiment) -> std::result::Result<SimulatedExperiment<'a>, Failure> {
         let begin = Instant::now();
         let machine = &self.case.machine;
         let mut writers = writers(self.folder, &experiment.file_name(), &self.args.format).map_err(Failure::work)?;
@@ -80,7 +80,7 @@ impl<'a> Setting<'a> {
             reduction = Reduction::of(machine, experiment, self.solver)?;
             log = beside_log(machine, experiment);
         }
-        Ok(Run { experiment, outcome, metrics, curves, samples, band, log, reduction, files, took })
+        Ok(SimulatedExperiment { experiment, outcome, metrics, curves, samples, band, log, reduction, files, took })
     }
 
     /// Runs it once more, as its recorder sees it, and writes the log.

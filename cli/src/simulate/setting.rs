@@ -8,7 +8,7 @@ use taut::machine::Machine;
 use taut::solve::Solver;
 
 /// Settings that all runs of a command share.
-pub struct Setting<'a> {
+pub struct RunSettings<'a> {
     pub args: &'a Simulate,
     pub case: &'a Case,
     pub solver: Solver,

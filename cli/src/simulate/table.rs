@@ -6,10 +6,10 @@ use std::time::Duration;
 use taut::case::Case;
 use taut::number;
 use taut::solve::Solver;
-use taut_report::simulate::{Run, early_end, lines, machine, solver_words};
+use taut_report::simulate::{SimulatedExperiment, early_end, lines, machine, solver_words};
 
 /// The text on the terminal.
-pub fn text(case: &Case, solver: Solver, runs: &[Run]) -> String {
+pub fn text(case: &Case, solver: Solver, runs: &[SimulatedExperiment]) -> String {
     let how = solver_words(solver, runs.iter().map(|run| &run.outcome));
     let mut text = format!("{}\n", bold(&case.title));
     if !case.is_axis() {

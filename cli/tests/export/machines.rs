@@ -119,11 +119,11 @@ struct Watched {
     /// References of all slides when the command acts, and their number.
     ahead: Vec<Reference>,
     slides: usize,
-    seen: Vec<Seen>,
+    seen: Vec<LoopRecord>,
 }
 
 /// Inputs of a controller: the references of all slides at the sample, then ahead of it, position and current.
-pub type Seen = Vec<f64>;
+pub type LoopRecord = Vec<f64>;
 
 /// The five numbers of a reference.
 fn five(r: &Reference) -> [f64; 5] {
@@ -162,7 +162,7 @@ pub fn observed(case: &Case, which: usize) -> Vec<([f64; 12], f64)> {
 }
 
 /// The same of the controller of each drive.
-pub fn observed_drives(case: &Case, which: usize) -> Vec<Vec<(Seen, f64)>> {
+pub fn observed_drives(case: &Case, which: usize) -> Vec<Vec<(LoopRecord, f64)>> {
     let design = case.controller.as_ref().unwrap();
     let one = &case.moves[which];
     let profiles = one.references(design);
@@ -176,7 +176,7 @@ pub fn observed_drives(case: &Case, which: usize) -> Vec<Vec<(Seen, f64)>> {
     let run = stream(&case.machine, &mut each, &timing, &profiles, &rows, solver, true, sink).unwrap();
     let of_drive = |(drive, watched): (usize, Watched)| {
         let samples = run.kept.iter().filter(|sample| sample.drive == drive);
-        let with_given = |(mut seen, sample): (Seen, &Sample)| {
+        let with_given = |(mut seen, sample): (LoopRecord, &Sample)| {
             let now = profiles.iter().flat_map(|profile| five(&profile.at(sample.time)));
             seen.splice(0..0, now);
             (seen, sample.given)

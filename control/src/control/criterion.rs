@@ -1,6 +1,6 @@
 //! Criteria for choosing shapers: residual vibration, smoothing, and the score of both.
 
-use super::kind::{Kind, TOLERANCE};
+use super::kind::{ShaperKind, TOLERANCE};
 use super::shaper::{Corner, Firmware, Form, Shaper, USUAL_DAMPING, check_damping};
 use super::spectrum::Spectrum;
 use crate::error::Result;
@@ -57,8 +57,8 @@ impl Default for Criterion {
     /// As in Klipper: designed for a damping ratio of 0.1, evaluated from 0.075 to 0.15. ZVD is fitted, but not a
     /// candidate: it is as long as EI and covers less.
     fn default() -> Self {
-        let forms: Vec<Form> = Kind::ALL.map(Form::from).to_vec();
-        let candidates = forms.iter().copied().filter(|form| form.kind() != Kind::Zvd).collect();
+        let forms: Vec<Form> = ShaperKind::ALL.map(Form::from).to_vec();
+        let candidates = forms.iter().copied().filter(|form| form.kind() != ShaperKind::Zvd).collect();
         let mut criterion = Self {
             damping: 0.0,
             tested: Vec::new(),
@@ -138,7 +138,7 @@ impl Target<'_> {
     }
 
     /// Frequencies tried for a kind, ascending.
-    pub(super) fn grid(&self, kind: Kind, firmware: Firmware) -> Vec<f64> {
+    pub(super) fn grid(&self, kind: ShaperKind, firmware: Firmware) -> Vec<f64> {
         match self {
             Target::Spectrum(_) | Target::Spectra(_) => {
                 let first = lowest(kind) * STEPS;
@@ -175,13 +175,13 @@ fn highest(firmware: Firmware) -> f64 {
 }
 
 /// Lowest frequency tried on a spectrum, Hz: a lower one would allow less than about 1500 mm/s².
-fn lowest(kind: Kind) -> f64 {
+fn lowest(kind: ShaperKind) -> f64 {
     match kind {
-        Kind::Zv => 21.0,
-        Kind::Mzv => 23.0,
-        Kind::Zvd | Kind::Ei => 29.0,
-        Kind::TwoHumpEi => 39.0,
-        Kind::ThreeHumpEi => 48.0,
+        ShaperKind::Zv => 21.0,
+        ShaperKind::Mzv => 23.0,
+        ShaperKind::Zvd | ShaperKind::Ei => 29.0,
+        ShaperKind::TwoHumpEi => 39.0,
+        ShaperKind::ThreeHumpEi => 48.0,
     }
 }
 

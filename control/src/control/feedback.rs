@@ -11,7 +11,7 @@ use super::filter::Biquad;
 use super::law::Law;
 use super::sampled::Observation;
 use super::standard::Text;
-use crate::calculator::{Dual, Run, Slope};
+use crate::calculator::{Dual, Evaluation, Slope};
 use crate::design::Design;
 use crate::error::Result;
 use crate::linear::eigen::{balance, scaled};
@@ -259,7 +259,7 @@ impl System {
         let n = text.slots.count();
         let rest = text.at_rest(has_scale);
         let mut memory = vec![0.0; n];
-        let run = &mut Run::on(&mut memory);
+        let run = &mut Evaluation::on(&mut memory);
         let given = text.step(run, &rest);
         text.moved(run, 0.0, given);
         let zero = Dual::constant(0.0);

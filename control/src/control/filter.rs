@@ -58,7 +58,7 @@ impl Biquad {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calculator::Run;
+    use crate::calculator::Evaluation;
 
     fn gain(filter: &Filter, frequency: f64) -> f64 {
         let every = 1e-3;
@@ -68,7 +68,7 @@ mod tests {
         let (mut re, mut im) = (0.0, 0.0);
         for k in 0..20_000 {
             let phase = 2.0 * PI * frequency * every * k as f64;
-            let y = biquad.step(&mut Run::on(&mut memory), phase.sin());
+            let y = biquad.step(&mut Evaluation::on(&mut memory), phase.sin());
             if k >= 10_000 {
                 re += y * phase.sin() / 5_000.0;
                 im += y * phase.cos() / 5_000.0;

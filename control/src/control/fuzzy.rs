@@ -1,7 +1,7 @@
 //! A fuzzy controller with its table of rules (A. Kulkarni, M. A. El-Sharkawi, "Intelligent precision position control
 //! of elastic drive systems", IEEE Transactions on Energy Conversion 16, 2001).
 
-use super::law::{Law, Seen, Speed};
+use super::law::{Law, LawInputs, Speed};
 use crate::calculator::{Calculator, Slot, Slots};
 use crate::design::Fuzzy;
 
@@ -35,7 +35,7 @@ impl Law for FuzzyLaw {
         false
     }
 
-    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+    fn step<C: Calculator>(&self, c: &mut C, seen: &LawInputs<C::N>) -> C::N {
         let rules = &self.rules;
         let error = seen.target.position - seen.position;
         let rate = seen.target.speed - self.speed.step(c, seen.position);
@@ -82,15 +82,15 @@ pub(crate) fn infer<C: Calculator>(c: &mut C, rules: &[Vec<f64>], error: C::N, r
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calculator::Run;
+    use crate::calculator::Evaluation;
 
     #[test]
     fn rules_hold_at_their_sets_and_blend_between_them() {
         let rules = vec![vec![-1.0, -0.5, 0.0], vec![-0.5, 0.0, 0.5], vec![0.0, 0.5, 1.0]];
-        assert_eq!(infer(&mut Run::plain(), &rules, 0.0, 0.0), 0.0);
-        assert_eq!(infer(&mut Run::plain(), &rules, 1.0, 1.0), 1.0);
-        assert_eq!(infer(&mut Run::plain(), &rules, -3.0, -1.0), -1.0);
-        assert_eq!(infer(&mut Run::plain(), &rules, 0.5, 0.0), 0.25);
-        assert_eq!(infer(&mut Run::plain(), &rules, 1.0, -1.0), 0.0);
+        assert_eq!(infer(&mut Evaluation::plain(), &rules, 0.0, 0.0), 0.0);
+        assert_eq!(infer(&mut Evaluation::plain(), &rules, 1.0, 1.0), 1.0);
+        assert_eq!(infer(&mut Evaluation::plain(), &rules, -3.0, -1.0), -1.0);
+        assert_eq!(infer(&mut Evaluation::plain(), &rules, 0.5, 0.0), 0.25);
+        assert_eq!(infer(&mut Evaluation::plain(), &rules, 1.0, -1.0), 0.0);
     }
 }

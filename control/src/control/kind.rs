@@ -7,7 +7,7 @@ pub const TOLERANCE: f64 = 0.05;
 
 /// Kind of shaper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum ShaperKind {
     /// Zero vibration.
     Zv,
     /// Zero vibration with three impulses within three quarters of a period.
@@ -22,44 +22,51 @@ pub enum Kind {
     ThreeHumpEi,
 }
 
-impl Kind {
+impl ShaperKind {
     /// All kinds, the shorter ones first.
-    pub const ALL: [Kind; 6] = [Kind::Zv, Kind::Mzv, Kind::Zvd, Kind::Ei, Kind::TwoHumpEi, Kind::ThreeHumpEi];
+    pub const ALL: [ShaperKind; 6] = [
+        ShaperKind::Zv,
+        ShaperKind::Mzv,
+        ShaperKind::Zvd,
+        ShaperKind::Ei,
+        ShaperKind::TwoHumpEi,
+        ShaperKind::ThreeHumpEi,
+    ];
 
     /// Its name, as in Klipper's configuration.
     pub fn name(self) -> &'static str {
         match self {
-            Kind::Zv => "zv",
-            Kind::Mzv => "mzv",
-            Kind::Zvd => "zvd",
-            Kind::Ei => "ei",
-            Kind::TwoHumpEi => "2hump_ei",
-            Kind::ThreeHumpEi => "3hump_ei",
+            ShaperKind::Zv => "zv",
+            ShaperKind::Mzv => "mzv",
+            ShaperKind::Zvd => "zvd",
+            ShaperKind::Ei => "ei",
+            ShaperKind::TwoHumpEi => "2hump_ei",
+            ShaperKind::ThreeHumpEi => "3hump_ei",
         }
     }
 
     /// Time between impulses, in damped periods.
     pub(crate) fn spacing(self) -> f64 {
-        if self == Kind::Mzv { 0.375 } else { 0.5 }
+        if self == ShaperKind::Mzv { 0.375 } else { 0.5 }
     }
 
     /// Amplitudes of the impulses for a mode without damping; their sum is 1.
     pub fn amplitudes(self) -> Vec<f64> {
         let v = TOLERANCE;
         match self {
-            Kind::Zv => vec![0.5, 0.5],
+            ShaperKind::Zv => vec![0.5, 0.5],
             // A₁ + A₂ e^{3πi/4} + A₁ e^{3πi/2} = 0 and 2 A₁ + A₂ = 1
-            Kind::Mzv => vec![1.0 - 1.0 / SQRT_2, SQRT_2 - 1.0, 1.0 - 1.0 / SQRT_2],
-            Kind::Zvd => vec![0.25, 0.5, 0.25],
+            ShaperKind::Mzv => vec![1.0 - 1.0 / SQRT_2, SQRT_2 - 1.0, 1.0 - 1.0 / SQRT_2],
+            ShaperKind::Zvd => vec![0.25, 0.5, 0.25],
             // V at the design frequency, zero at two frequencies beside it                     (Singhose 1994)
-            Kind::Ei => vec![(1.0 + v) / 4.0, (1.0 - v) / 2.0, (1.0 + v) / 4.0],
-            Kind::TwoHumpEi => {
+            ShaperKind::Ei => vec![(1.0 + v) / 4.0, (1.0 - v) / 2.0, (1.0 + v) / 4.0],
+            ShaperKind::TwoHumpEi => {
                 // X = ∛(V² (√(1 − V²) + 1)), A₁ = (3 X² + 2 X + 3 V²) / (16 X), A₂ = ½ − A₁     (Singhose 1997)
                 let x = (v * v * ((1.0 - v * v).sqrt() + 1.0)).cbrt();
                 let a = (3.0 * x * x + 2.0 * x + 3.0 * v * v) / (16.0 * x);
                 vec![a, 0.5 - a, 0.5 - a, a]
             }
-            Kind::ThreeHumpEi => {
+            ShaperKind::ThreeHumpEi => {
                 // A₁ = (1 + 3 V + 2 √(2 (V² + V))) / 16, A₂ = (1 − V) / 4, A₃ = 1 − 2 (A₁ + A₂)  (Singhose 1997)
                 let a = (1.0 + 3.0 * v + 2.0 * (2.0 * (v * v + v)).sqrt()) / 16.0;
                 let b = (1.0 - v) / 4.0;
@@ -69,17 +76,17 @@ impl Kind {
     }
 
     /// The shaper of this name.
-    pub fn from_name(name: &str) -> Option<Kind> {
-        Kind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name.trim()))
+    pub fn from_name(name: &str) -> Option<ShaperKind> {
+        ShaperKind::ALL.into_iter().find(|kind| kind.name().eq_ignore_ascii_case(name.trim()))
     }
 
     /// Largest damping ratio that Klipper accepts in its configuration.
     pub(super) fn most_damping(self) -> f64 {
         match self {
-            Kind::Zv | Kind::Mzv | Kind::Zvd => 0.99,
-            Kind::Ei => 0.4,
-            Kind::TwoHumpEi => 0.3,
-            Kind::ThreeHumpEi => 0.2,
+            ShaperKind::Zv | ShaperKind::Mzv | ShaperKind::Zvd => 0.99,
+            ShaperKind::Ei => 0.4,
+            ShaperKind::TwoHumpEi => 0.3,
+            ShaperKind::ThreeHumpEi => 0.2,
         }
     }
 }

@@ -9,7 +9,7 @@ use crate::signal::profile::Reference;
 
 /// Inputs of a law at a sample.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen<'a, N> {
+pub struct LawInputs<'a, N> {
     /// Reference of the cart.
     pub reference: Reference<N>,
     /// Reference of the encoder's side for which the cart is at its reference.
@@ -38,7 +38,7 @@ pub trait Law {
     fn is_linear(&self) -> bool;
 
     /// The next command without feed-forward.
-    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N;
+    fn step<C: Calculator>(&self, c: &mut C, seen: &LawInputs<C::N>) -> C::N;
 
     /// Receives the change of the command by the limit (`excess`), and the command that the axis gets less dry
     /// friction.

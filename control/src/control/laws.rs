@@ -1,7 +1,7 @@
 //! Control laws, one for each structure of a design.
 
 use super::fuzzy::FuzzyLaw;
-use super::law::{Law, Seen};
+use super::law::{Law, LawInputs};
 use super::pid::{CascadeLaw, PidLaw};
 use super::sliding::SlidingLaw;
 use super::state_feedback::StateFeedbackLaw;
@@ -66,7 +66,7 @@ impl Law for AnyLaw {
         each_law!(self, law => law.is_linear())
     }
 
-    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+    fn step<C: Calculator>(&self, c: &mut C, seen: &LawInputs<C::N>) -> C::N {
         each_law!(self, law => law.step(c, seen))
     }
 
@@ -88,7 +88,7 @@ impl Law for OpenLoop {
         true
     }
 
-    fn step<C: Calculator>(&self, _: &mut C, seen: &Seen<C::N>) -> C::N {
+    fn step<C: Calculator>(&self, _: &mut C, seen: &LawInputs<C::N>) -> C::N {
         seen.reference.position
     }
 

@@ -2,7 +2,7 @@
 //!
 //! With the weight c of the reference speed: c = 1 differentiates the error, c = 0 the measurement alone.
 
-use super::law::{Last, Law, Seen, Speed};
+use super::law::{Last, Law, LawInputs, Speed};
 use crate::calculator::{Calculator, Slot, Slots};
 use crate::design::{Cascade, Pid};
 
@@ -39,7 +39,7 @@ impl Law for PidLaw {
         true
     }
 
-    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+    fn step<C: Calculator>(&self, c: &mut C, seen: &LawInputs<C::N>) -> C::N {
         let Pid { proportional, integral, derivative, filter, reference_speed, .. } = self.gains;
         let (target, position, every) = (&seen.target, seen.position, self.every);
         let error = c.name("error", target.position - position);
@@ -113,7 +113,7 @@ impl Law for CascadeLaw {
         true
     }
 
-    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+    fn step<C: Calculator>(&self, c: &mut C, seen: &LawInputs<C::N>) -> C::N {
         let gains = &self.gains;
         // With a scale, the position loop is closed at the cart with the cart's reference.
         let (aim, load) = match seen.scale {

@@ -8,7 +8,7 @@
 //! W. Singhose, L. Porter, T. Tuttle, N. Singer, "Vibration reduction using multi-hump input shapers", *J. Dynamic
 //! Systems, Measurement, and Control* 119 (1997) 320-326.
 
-use super::kind::Kind;
+use super::kind::ShaperKind;
 
 /// Coefficients over the damping ratio, constant first.
 type Cubic = [f64; 4];
@@ -38,12 +38,12 @@ fn at(coefficients: &[f64], x: f64) -> f64 {
 /// Impulses (time in undamped periods, amplitude) of an extra-insensitive shaper of tolerance V (of EI; the others have
 /// 5 %) for a damping ratio ζ; the amplitudes sum to 1. None if an amplitude is not positive or the times are not in
 /// order, and for other kinds.
-pub(super) fn impulses(kind: Kind, tolerance: f64, damping: f64) -> Option<Vec<(f64, f64)>> {
+pub(super) fn impulses(kind: ShaperKind, tolerance: f64, damping: f64) -> Option<Vec<(f64, f64)>> {
     let (v, zeta) = (tolerance, damping);
     let of = |table: &[(Cubic, Cubic)]| table.iter().map(|(t, a)| (at(t, zeta), at(a, zeta))).collect::<Vec<_>>();
     let all = match kind {
-        Kind::Zv | Kind::Mzv | Kind::Zvd => return None,
-        Kind::Ei => {
+        ShaperKind::Zv | ShaperKind::Mzv | ShaperKind::Zvd => return None,
+        ShaperKind::Ei => {
             let a1 = at(&[0.24968 + 0.24961 * v, 0.80008 + 1.23328 * v, 0.49599 + 3.17316 * v], zeta);
             let a3 = at(&[0.25149 + 0.21474 * v, -0.83249 + 1.41498 * v, 0.85181 - 4.90094 * v], zeta);
             // t₂ is in damped periods; the last impulse is after one period.
@@ -53,8 +53,8 @@ pub(super) fn impulses(kind: Kind, tolerance: f64, damping: f64) -> Option<Vec<(
             let period = 1.0 / (1.0 - zeta * zeta).sqrt();
             vec![(0.0, a1), (t2 * period, 1.0 - a1 - a3), (period, a3)]
         }
-        Kind::TwoHumpEi => of(&TWO_HUMPS),
-        Kind::ThreeHumpEi => of(&THREE_HUMPS),
+        ShaperKind::TwoHumpEi => of(&TWO_HUMPS),
+        ShaperKind::ThreeHumpEi => of(&THREE_HUMPS),
     };
     let sum: f64 = all.iter().map(|impulse| impulse.1).sum();
     let is_ordered = all.windows(2).all(|pair| pair[0].0 < pair[1].0);

@@ -48,7 +48,7 @@ pub struct Coordinate {
 
 /// A file with its shapers.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub struct ShaperFile {
     /// The file.
     pub file: PathBuf,
     /// Further files read with it.
@@ -69,7 +69,7 @@ pub struct Found {
 #[derive(Debug, Clone)]
 pub struct Findings {
     /// Result for each file.
-    pub each: Vec<Found>,
+    pub each: Vec<ShaperFile>,
     /// Comparison of two spectra.
     pub comparison: Option<Comparison>,
     /// The looser of two belts, if it was asked for.
@@ -146,15 +146,16 @@ pub fn recommend(args: &Question, files: &[PathBuf]) -> Result<Findings> {
         false => files.iter().map(|file| find(args, files, file)).collect::<Result<Vec<_>>>()?.concat(),
     };
     let comparison = match each.as_slice() {
-        [Found { source: Source::Spectrum(first), .. }, Found { source: Source::Spectrum(second), .. }] => {
+        [ShaperFile { source: Source::Spectrum(first), .. }, ShaperFile { source: Source::Spectrum(second), .. }] => {
             Some(compare(first, second))
         }
         _ => None,
     };
     let belts = match each.as_slice() {
-        [a @ Found { source: Source::Spectrum(first), .. }, b @ Found { source: Source::Spectrum(second), .. }]
-            if args.belts =>
-        {
+        [
+            a @ ShaperFile { source: Source::Spectrum(first), .. },
+            b @ ShaperFile { source: Source::Spectrum(second), .. },
+        ] if args.belts => {
             moves_along_both(&a.file, first)?;
             moves_along_both(&b.file, second)?;
             if first.axes == second.axes {
@@ -205,7 +206,7 @@ fn moves_along_both(file: &Path, spectrum: &Spectrum) -> Result<()> {
 }
 
 /// One shaper for all files.
-fn together(args: &Question, files: &[PathBuf]) -> Result<Found> {
+fn together(args: &Question, files: &[PathBuf]) -> Result<ShaperFile> {
     if let Some(file) = files.iter().find(|file| is_case(file)) {
         let error = Error::new("a case file has no spectrum to put together with others").in_file(file);
         return Err(error.next("leave --together out; a case is evaluated along its whole travel anyway"));
@@ -224,7 +225,7 @@ fn is_case(file: &Path) -> bool {
 }
 
 /// Recommendations for a file: one, or one for each coordinate of a machine.
-fn find(args: &Question, files: &[PathBuf], file: &Path) -> Result<Vec<Found>> {
+fn find(args: &Question, files: &[PathBuf], file: &Path) -> Result<Vec<ShaperFile>> {
     if !is_case(file) {
         return Ok(vec![chosen(args, file, measured(args, files, file)?, Vec::new())?]);
     }
@@ -236,7 +237,7 @@ fn find(args: &Question, files: &[PathBuf], file: &Path) -> Result<Vec<Found>> {
     sources.into_iter().map(|source| chosen(args, file, source, also.clone())).collect()
 }
 
-fn chosen(args: &Question, file: &Path, source: Source, also: Vec<PathBuf>) -> Result<Found> {
+fn chosen(args: &Question, file: &Path, source: Source, also: Vec<PathBuf>) -> Result<ShaperFile> {
     let mut criterion = Criterion {
         max_smoothing: args.max_smoothing,
         max_vibrations: args.max_vibrations,
@@ -291,7 +292,7 @@ fn chosen(args: &Question, file: &Path, source: Source, also: Vec<PathBuf>) -> R
         Source::Model { modes, .. } => Target::Modes { modes, uncertainty },
     };
     let choice = choose(target, &criterion).map_err(|e| e.in_file(file))?;
-    Ok(Found { file: file.to_path_buf(), also, uncertainty, source, criterion, choice, mode })
+    Ok(ShaperFile { file: file.to_path_buf(), also, uncertainty, source, criterion, choice, mode })
 }
 
 /// The mean damping ratio of the modes that move the cart most, over the travel.
@@ -350,7 +351,7 @@ pub struct Left {
     pub pairs: Vec<f64>,
 }
 
-impl Found {
+impl ShaperFile {
     /// Each mode of a model along the travel, the strongest first; none of a measured spectrum.
     pub fn left(&self) -> Vec<Left> {
         let Source::Model { modes, .. } = &self.source else { return Vec::new() };

@@ -15,7 +15,7 @@ pub(super) struct Sampled<'a, 'c> {
     profiles: &'a [Profile],
     clocked: Clocked,
     /// Last command of each drive.
-    pub(super) told: [Told; DRIVES],
+    pub(super) told: [DriveCommands; DRIVES],
     /// End of the run, s.
     until: f64,
     /// Number of samples, and of those with a limited command.
@@ -28,7 +28,7 @@ pub(super) struct Sampled<'a, 'c> {
 
 /// The commands of a drive.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Told {
+pub(super) struct DriveCommands {
     /// Duration of limited commands, s.
     pub held_back: f64,
     /// Sign changes of the increments of the acting command, and its last non-zero increment.
@@ -38,7 +38,7 @@ pub(super) struct Told {
     pub at_rest: Rest,
 }
 
-impl Told {
+impl DriveCommands {
     /// Initial state, for a profile that ends at `end`, s, and a run that ends at `until`.
     fn new(end: f64, until: f64) -> Self {
         Self { held_back: 0.0, turns: 0, way: 0.0, at_rest: Rest::new(end, until) }
@@ -57,7 +57,7 @@ impl<'a, 'c> Sampled<'a, 'c> {
             controllers,
             profiles,
             clocked: Clocked::new(machine, timing),
-            told: [Told::new(f64::INFINITY, f64::INFINITY); DRIVES],
+            told: [DriveCommands::new(f64::INFINITY, f64::INFINITY); DRIVES],
             until: f64::INFINITY,
             samples: 0,
             limited: 0,
@@ -69,7 +69,7 @@ impl<'a, 'c> Sampled<'a, 'c> {
     /// For a run that ends there, which ends the holding of commands.
     pub(super) fn until(mut self, until: f64) -> Self {
         self.until = until;
-        self.told = [Told::new(self.profiles.first().map_or(0.0, Profile::end), until); DRIVES];
+        self.told = [DriveCommands::new(self.profiles.first().map_or(0.0, Profile::end), until); DRIVES];
         self
     }
 

@@ -7,7 +7,7 @@
 //! as the first, 119, 1997. MZV is Klipper's: three impulses within three quarters of a period (its documentation,
 //! "Resonance Compensation").
 
-pub use super::kind::{Kind, TOLERANCE};
+pub use super::kind::{ShaperKind, TOLERANCE};
 use super::polynomials;
 use crate::error::{Error, Result};
 use nalgebra::Complex;
@@ -44,7 +44,7 @@ impl Firmware {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Form {
     /// With the usual parameters.
-    Usual(Kind),
+    Usual(ShaperKind),
     /// Zero vibration with equidistant impulses, the last after a number of damped periods.
     Mzv {
         /// 3 to 20.
@@ -59,19 +59,19 @@ pub enum Form {
     },
 }
 
-impl From<Kind> for Form {
-    fn from(kind: Kind) -> Self {
+impl From<ShaperKind> for Form {
+    fn from(kind: ShaperKind) -> Self {
         Form::Usual(kind)
     }
 }
 
 impl Form {
     /// Its kind.
-    pub fn kind(self) -> Kind {
+    pub fn kind(self) -> ShaperKind {
         match self {
             Form::Usual(kind) => kind,
-            Form::Mzv { .. } => Kind::Mzv,
-            Form::Ei { .. } => Kind::Ei,
+            Form::Mzv { .. } => ShaperKind::Mzv,
+            Form::Ei { .. } => ShaperKind::Ei,
         }
     }
 
@@ -99,7 +99,8 @@ impl Form {
                 None => return Err(wrong(format!("the parenthesis of \"{text}\" is not closed"))),
             },
         };
-        let kind = Kind::from_name(name).ok_or_else(|| wrong(format!("there is no shaper \"{}\"", name.trim())))?;
+        let kind =
+            ShaperKind::from_name(name).ok_or_else(|| wrong(format!("there is no shaper \"{}\"", name.trim())))?;
         let Some(given) = given else { return Ok(Form::Usual(kind)) };
         let mut values: Vec<(&str, f64)> = Vec::new();
         for one in given.split(',') {
@@ -112,15 +113,15 @@ impl Form {
         }
         let value = |key: &str| values.iter().find(|(known, _)| *known == key).map(|(_, value)| *value);
         let known: &[&str] = match kind {
-            Kind::Mzv => &["n", "t", "tau"],
-            Kind::Ei => &["v_tol"],
-            Kind::Zv | Kind::Zvd | Kind::TwoHumpEi | Kind::ThreeHumpEi => &[],
+            ShaperKind::Mzv => &["n", "t", "tau"],
+            ShaperKind::Ei => &["v_tol"],
+            ShaperKind::Zv | ShaperKind::Zvd | ShaperKind::TwoHumpEi | ShaperKind::ThreeHumpEi => &[],
         };
         if let Some((key, _)) = values.iter().find(|(key, _)| !known.contains(key)) {
             return Err(wrong(format!("{} has no parameter \"{key}\"", kind.name())));
         }
         let form = match kind {
-            Kind::Mzv => {
+            ShaperKind::Mzv => {
                 let n = value("n").unwrap_or(3.0);
                 if !(3.0..=20.0).contains(&n) || n.fract() != 0.0 {
                     return Err(wrong(format!("mzv with n = {n} impulses")).allowed("whole numbers from 3 to 20"));
@@ -134,8 +135,8 @@ impl Form {
                 };
                 Form::Mzv { pulses: n as usize, duration }
             }
-            Kind::Ei => Form::Ei { tolerance: value("v_tol").unwrap_or(TOLERANCE) },
-            Kind::Zv | Kind::Zvd | Kind::TwoHumpEi | Kind::ThreeHumpEi => Form::Usual(kind),
+            ShaperKind::Ei => Form::Ei { tolerance: value("v_tol").unwrap_or(TOLERANCE) },
+            ShaperKind::Zv | ShaperKind::Zvd | ShaperKind::TwoHumpEi | ShaperKind::ThreeHumpEi => Form::Usual(kind),
         };
         Pattern::new(form, Firmware::Klipper, USUAL_DAMPING).map(|_| form)
     }
@@ -172,7 +173,9 @@ impl Pattern {
                 .next("take a shorter shaper, or a smaller damping ratio"));
         }
         let impulses = match form {
-            Form::Usual(Kind::Zv | Kind::Mzv | Kind::Zvd) => weighted(&kind.amplitudes(), kind.spacing(), damping),
+            Form::Usual(ShaperKind::Zv | ShaperKind::Mzv | ShaperKind::Zvd) => {
+                weighted(&kind.amplitudes(), kind.spacing(), damping)
+            }
             Form::Usual(_) => extra_insensitive(form, TOLERANCE, damping)?,
             Form::Ei { tolerance } => extra_insensitive(form, tolerance, damping)?,
             Form::Mzv { pulses, duration } => {
@@ -248,7 +251,7 @@ fn modified(pulses: usize, duration: f64) -> Option<Vec<f64>> {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shaper {
     /// Which.
-    pub kind: Kind,
+    pub kind: ShaperKind,
     /// Kind and parameters.
     pub form: Form,
     /// Undamped natural frequency of the mode it is designed for, Hz.
@@ -261,7 +264,7 @@ pub struct Shaper {
 impl Shaper {
     /// The shaper for a mode of undamped natural `frequency` (Hz, above 0) and `damping` ratio (0 to below 1), damped
     /// as Klipper did until 2025-08; [`Shaper::formed`] has today's definitions.
-    pub fn new(kind: Kind, frequency: f64, damping: f64) -> Result<Self> {
+    pub fn new(kind: ShaperKind, frequency: f64, damping: f64) -> Result<Self> {
         Self::formed(kind.into(), Firmware::Klipper202508, frequency, damping)
     }
 

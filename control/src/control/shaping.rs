@@ -7,7 +7,7 @@
 use super::criterion::score;
 pub use super::criterion::{ALLOWED_SMOOTHING, Criterion, Target};
 use super::pairs::{Pair, pairs};
-use super::shaper::{Firmware, Kind, Pattern, Shaper};
+use super::shaper::{Firmware, Pattern, Shaper, ShaperKind};
 use crate::error::{Error, Result};
 use crate::quantity::rounded;
 
@@ -147,12 +147,12 @@ fn recommended(fitted: &mut [Tried], candidates: &[usize], wanted: Option<f64>, 
             }
         }
     }
-    if is_measured && fitted[best].pattern.form.kind() == Kind::Zv {
+    if is_measured && fitted[best].pattern.form.kind() == ShaperKind::Zv {
         let left = fitted[best].taken().vibration;
         let other = candidates
             .iter()
             .copied()
-            .find(|&i| fitted[i].pattern.form.kind() != Kind::Zv && 1.1 * fitted[i].taken().vibration < left);
+            .find(|&i| fitted[i].pattern.form.kind() != ShaperKind::Zv && 1.1 * fitted[i].taken().vibration < left);
         best = other.unwrap_or(best);
     }
     best

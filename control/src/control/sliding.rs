@@ -1,6 +1,6 @@
 //! Sliding mode with a boundary layer, and its reaching condition.
 
-use super::law::{Law, Seen, Speed};
+use super::law::{Law, LawInputs, Speed};
 use crate::calculator::{Calculator, Slot, Slots};
 use crate::design::SlidingMode;
 use crate::machine::rigid::Rigid;
@@ -43,7 +43,7 @@ impl Law for SlidingLaw {
     }
 
     /// Feed-forward is the rest of the equivalent control.
-    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+    fn step<C: Calculator>(&self, c: &mut C, seen: &LawInputs<C::N>) -> C::N {
         let SlidingMode { bandwidth, reaching, boundary, integral, .. } = self.gains;
         let error = c.name("error", seen.target.position - seen.position);
         let rate = seen.target.speed - self.speed.step(c, seen.position);

@@ -1,11 +1,11 @@
 //! A controller from its design: structure, feed-forward, observer and filters combined.
 
 use super::filter::Biquad;
-use super::law::{Law, Seen};
+use super::law::{Law, LawInputs};
 use super::laws::AnyLaw;
 use super::observer::DisturbanceObserver;
 use super::sampled::{Controller, Observation};
-use crate::calculator::{Calculator, Run, Slot, Slots};
+use crate::calculator::{Calculator, Evaluation, Slot, Slots};
 use crate::design::{Design, FeedForward, Structure};
 use crate::error::{Error, Result};
 use crate::machine::rigid::Rigid;
@@ -121,7 +121,7 @@ impl Text {
         }
         c.remark(self.law.about());
         let &Observation { reference, position, scale, current, .. } = seen;
-        let own = self.law.step(c, &Seen { reference, target, position, scale, current, forward, compensation });
+        let own = self.law.step(c, &LawInputs { reference, target, position, scale, current, forward, compensation });
         let own = self.filters.iter().fold(own, |value, filter| filter.step(c, value));
         let mut asked = added.map_or(own, |added| own + added);
         let mut common = position;
@@ -163,7 +163,7 @@ impl Text {
     /// Inputs of a controller at rest: the axis at its reference, zero.
     pub fn at_rest(&self, has_scale: bool) -> Observation {
         let zero = Reference::default();
-        let position = self.compensation.target(&mut Run::plain(), &zero).position;
+        let position = self.compensation.target(&mut Evaluation::plain(), &zero).position;
         let scale = has_scale.then_some(0.0);
         Observation { time: 0.0, reference: zero, ahead: zero, position, scale, current: 0.0 }
     }
@@ -197,21 +197,21 @@ impl Standard {
 
 impl Controller for Standard {
     fn step(&mut self, seen: &Observation) -> f64 {
-        self.text.step_with(&mut Run::on(&mut self.memory), seen, self.inner)
+        self.text.step_with(&mut Evaluation::on(&mut self.memory), seen, self.inner)
     }
 
     fn forward(&mut self, slides: &[Reference]) -> f64 {
-        let [outside, inner] = self.text.forward(&mut Run::plain(), slides);
+        let [outside, inner] = self.text.forward(&mut Evaluation::plain(), slides);
         self.inner = inner;
         outside.unwrap_or(0.0)
     }
 
     fn target(&self, along: Reference, slides: &[Reference]) -> Reference {
-        self.text.target(&mut Run::plain(), along, slides)
+        self.text.target(&mut Evaluation::plain(), along, slides)
     }
 
     fn limited(&mut self, given: f64) {
-        self.text.limited(&mut Run::on(&mut self.memory), given);
+        self.text.limited(&mut Evaluation::on(&mut self.memory), given);
     }
 
     fn reset(&mut self) {

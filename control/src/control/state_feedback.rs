@@ -1,6 +1,6 @@
 //! State feedback with a Kalman filter: LQG, and with an integral LQI.
 
-use super::law::{Law, Seen};
+use super::law::{Law, LawInputs};
 use super::model::Linear;
 use super::model::Quantity;
 use super::riccati;
@@ -162,7 +162,7 @@ impl StateFeedbackLaw {
     }
 
     /// The states if the cart were at its reference.
-    fn wanted<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> [C::N; STATES] {
+    fn wanted<C: Calculator>(&self, c: &mut C, seen: &LawInputs<C::N>) -> [C::N; STATES] {
         let (r, reference) = (self.radius, &seen.reference);
         let needed = seen.compensation.needed_by(c, reference);
         let (current, _) = seen.compensation.rigid.current_by(c, needed.force[0], &needed.drive);
@@ -214,7 +214,7 @@ impl Law for StateFeedbackLaw {
         true
     }
 
-    fn step<C: Calculator>(&self, c: &mut C, seen: &Seen<C::N>) -> C::N {
+    fn step<C: Calculator>(&self, c: &mut C, seen: &LawInputs<C::N>) -> C::N {
         let n = self.states.len();
         let wanted = self.wanted(c, seen);
         let mut estimate = self.estimated(c, seen.position);

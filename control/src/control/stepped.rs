@@ -2,7 +2,7 @@
 
 use super::sampled::{Controller, Loop, Observation, SLIDES, Sensors};
 use super::standard::Standard;
-use crate::calculator::Run;
+use crate::calculator::Evaluation;
 use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
@@ -104,7 +104,7 @@ impl Clocked {
         let mut given = [0.0; DRIVES];
         for (drive, controller) in controllers.iter_mut().enumerate() {
             let (sensors, shares) = (&self.sensors[drive], self.shares[drive]);
-            let weighed = |all: &[Reference; SLIDES]| Reference::weighed(&mut Run::plain(), shares, all);
+            let weighed = |all: &[Reference; SLIDES]| Reference::weighed(&mut Evaluation::plain(), shares, all);
             let [reference, ahead] = [&slides, &later].map(weighed);
             let forward = controller.forward(&later);
             let seen = Observation {

@@ -1,7 +1,9 @@
 //! Complete linear analysis of a machine: matrices, poles, zeros, responses, modes, resonances along the travel or over
 //! the working area.
 
-use super::{Discrete, Hold, Natural, Operation, Place, Range, ResonanceMap, Response, StateSpace, System, Transfer};
+use super::{
+    Discrete, Hold, Natural, Operation, Range, ResonanceMap, ResonancesAt, Response, StateSpace, System, Transfer,
+};
 use super::{assumptions, place, places, sticks, travel};
 use crate::case::Case;
 use crate::error::{Error, Result};
@@ -56,9 +58,9 @@ pub struct Analysis<'a> {
     /// True if the machine sticks at rest.
     pub sticks: bool,
     /// Resonances at the requested position.
-    pub here: Place,
+    pub here: ResonancesAt,
     /// Resonances along the travel of an axis, if they depend on the position.
-    pub travel: Option<Vec<Place>>,
+    pub travel: Option<Vec<ResonancesAt>>,
     /// Resonances over the working area of a gantry, if they depend on the position.
     pub map: Option<ResonanceMap>,
 }

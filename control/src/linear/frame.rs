@@ -22,7 +22,7 @@ impl Variable {
     /// The angle or position of a body.
     pub(super) fn angle(plant: &Mechanism, body: usize) -> Self {
         let part = &plant.bodies[body];
-        let way = if part.kind == mechanism::Kind::Linear { "position" } else { "angle" };
+        let way = if part.kind == mechanism::MotionKind::Linear { "position" } else { "angle" };
         Self::new(format!("{}_{way}", part.label.key), part.kind.units()[0])
     }
 
@@ -64,11 +64,11 @@ pub(super) struct Frame {
     /// Number of inputs.
     inputs: usize,
     /// The quantity of each state, by which it is found in another frame.
-    kinds: Vec<Kind>,
+    kinds: Vec<StateKind>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum StateKind {
     Angle(usize),
     Stretch(usize),
     Speed(usize),
@@ -88,7 +88,7 @@ pub(super) fn gears(plant: &Mechanism) -> impl Iterator<Item = usize> + '_ {
 /// The pulleys, each with the first span between it and slides only, or a bridge that yaws.
 fn pulleys(machine: &Machine, plant: &Mechanism) -> Vec<(usize, usize)> {
     let yaws = |body: usize| plant.ride.is_some_and(|ride| ride.yaw == body);
-    let slides = |body: usize| plant.bodies[body].kind == mechanism::Kind::Linear || yaws(body);
+    let slides = |body: usize| plant.bodies[body].kind == mechanism::MotionKind::Linear || yaws(body);
     let turning = plant.held_bodies().filter(|body| !slides(*body));
     let own = |body: usize| {
         let hangs = |span: &usize| {
@@ -105,13 +105,13 @@ impl Frame {
     pub(super) fn outer(machine: &Machine, plant: &Mechanism, held: &[bool], speed: f64) -> Self {
         let moving: Vec<usize> = moving(plant, held);
         let is_rotor = |body: &&usize| plant.bodies[**body].is_rotor;
-        let mut kinds: Vec<Kind> = Vec::new();
+        let mut kinds: Vec<StateKind> = Vec::new();
         for &j in moving.iter().filter(|body| !is_rotor(body)) {
-            kinds.extend([Kind::Angle(j), Kind::Speed(j)]);
+            kinds.extend([StateKind::Angle(j), StateKind::Speed(j)]);
         }
         kinds.extend(currents(plant));
         for &j in moving.iter().filter(is_rotor) {
-            kinds.extend([Kind::Angle(j), Kind::Speed(j)]);
+            kinds.extend([StateKind::Angle(j), StateKind::Speed(j)]);
         }
         kinds.extend(bristles(plant, held, speed));
         Self::new(machine, plant, kinds, false)
@@ -123,21 +123,22 @@ impl Frame {
         if held.contains(&true) {
             return Self::outer(machine, plant, held, speed);
         }
-        let mut kinds: Vec<Kind> = machine.geometry().slides.iter().map(|slide| Kind::Angle(slide.body)).collect();
-        kinds.extend(plant.ride.map(|ride| Kind::Angle(ride.yaw)));
+        let mut kinds: Vec<StateKind> =
+            machine.geometry().slides.iter().map(|slide| StateKind::Angle(slide.body)).collect();
+        kinds.extend(plant.ride.map(|ride| StateKind::Angle(ride.yaw)));
         let of_pulleys = pulleys(machine, plant).into_iter().filter(|(body, _)| plant.leader(*body) == *body);
-        kinds.extend(of_pulleys.map(|(_, span)| Kind::Stretch(span)));
-        kinds.extend(gears(plant).map(Kind::Stretch));
-        kinds.extend(moving(plant, held).into_iter().map(Kind::Speed));
+        kinds.extend(of_pulleys.map(|(_, span)| StateKind::Stretch(span)));
+        kinds.extend(gears(plant).map(StateKind::Stretch));
+        kinds.extend(moving(plant, held).into_iter().map(StateKind::Speed));
         kinds.extend(currents(plant));
         kinds.extend(bristles(plant, held, speed));
         Self::new(machine, plant, kinds, true)
     }
 
-    fn new(machine: &Machine, plant: &Mechanism, kinds: Vec<Kind>, relative: bool) -> Self {
+    fn new(machine: &Machine, plant: &Mechanism, kinds: Vec<StateKind>, relative: bool) -> Self {
         let n = kinds.len();
-        let place = |kind: Kind| kinds.iter().position(|k| *k == kind);
-        let unit = |kind: Kind, factor: f64| {
+        let place = |kind: StateKind| kinds.iter().position(|k| *k == kind);
+        let unit = |kind: StateKind, factor: f64| {
             let mut row = DVector::zeros(n);
             if let Some(place) = place(kind) {
                 row[place] = factor;
@@ -145,9 +146,9 @@ impl Frame {
             row
         };
         // A follower moves by its leader's displacement times a ratio.
-        let led = |kind: fn(usize) -> Kind, j: usize| unit(kind(plant.leader(j)), plant.ratio(j));
+        let led = |kind: fn(usize) -> StateKind, j: usize| unit(kind(plant.leader(j)), plant.ratio(j));
         let bodies = 0..plant.bodies.len();
-        let speed: Vec<DVector<f64>> = bodies.clone().map(|j| led(Kind::Speed, j)).collect();
+        let speed: Vec<DVector<f64>> = bodies.clone().map(|j| led(StateKind::Speed, j)).collect();
         let along = |ways: &[DVector<f64>], spring: usize| {
             let arms = &plant.springs[spring].arms;
             arms.iter().fold(DVector::zeros(n), |sum, &(body, arm)| sum + &ways[body] * arm)
@@ -155,8 +156,8 @@ impl Frame {
         let angle: Vec<DVector<f64>>;
         let mut stretch: Vec<DVector<f64>>;
         if relative {
-            let mut ways: Vec<DVector<f64>> = bodies.clone().map(|j| unit(Kind::Angle(j), 1.0)).collect();
-            stretch = (0..plant.springs.len()).map(|spring| unit(Kind::Stretch(spring), 1.0)).collect();
+            let mut ways: Vec<DVector<f64>> = bodies.clone().map(|j| unit(StateKind::Angle(j), 1.0)).collect();
+            stretch = (0..plant.springs.len()).map(|spring| unit(StateKind::Stretch(spring), 1.0)).collect();
             // The position of a pulley or rotor follows from its spring's length and the other bodies of that spring.
             let solved = |ways: &[DVector<f64>], stretch: &DVector<f64>, spring: usize, body: usize| {
                 let arms = &plant.springs[spring].arms;
@@ -196,34 +197,34 @@ impl Frame {
             }
             angle = ways;
         } else {
-            angle = bodies.map(|j| led(Kind::Angle, j)).collect();
+            angle = bodies.map(|j| led(StateKind::Angle, j)).collect();
             stretch = (0..plant.springs.len()).map(|spring| along(&angle, spring)).collect();
         }
         let ways = kinds
             .iter()
             .enumerate()
             .filter_map(|(place, kind)| match *kind {
-                Kind::Angle(j) => Some((place, speed[j].clone())),
-                Kind::Stretch(j) => Some((place, along(&speed, j))),
+                StateKind::Angle(j) => Some((place, speed[j].clone())),
+                StateKind::Stretch(j) => Some((place, along(&speed, j))),
                 _ => None,
             })
             .collect();
         let variables = kinds.iter().map(|kind| match *kind {
-            Kind::Angle(j) => Variable::angle(plant, j),
-            Kind::Speed(j) => Variable::speed(plant, j),
-            Kind::Current(number) => Variable::current(machine.geometry(), plant, number),
-            Kind::Bristle(j) => {
+            StateKind::Angle(j) => Variable::angle(plant, j),
+            StateKind::Speed(j) => Variable::speed(plant, j),
+            StateKind::Current(number) => Variable::current(machine.geometry(), plant, number),
+            StateKind::Bristle(j) => {
                 let part = &plant.bodies[j];
                 Variable::new(format!("{}_bristle", part.label.key), part.kind.units()[0])
             }
-            Kind::Stretch(j) if gears(plant).any(|gear| gear == j) => Variable::new("twist", "rad"),
-            Kind::Stretch(_) => Variable::new("stretch", "m"),
+            StateKind::Stretch(j) if gears(plant).any(|gear| gear == j) => Variable::new("twist", "rad"),
+            StateKind::Stretch(_) => Variable::new("stretch", "m"),
         });
         Self {
             variables: variables.collect(),
-            speed_place: (0..plant.bodies.len()).map(|j| place(Kind::Speed(j))).collect(),
-            current_place: (0..CURRENTS).map(|number| place(Kind::Current(number))).collect(),
-            bristle_place: (0..plant.bodies.len()).map(|j| place(Kind::Bristle(j))).collect(),
+            speed_place: (0..plant.bodies.len()).map(|j| place(StateKind::Speed(j))).collect(),
+            current_place: (0..CURRENTS).map(|number| place(StateKind::Current(number))).collect(),
+            bristle_place: (0..plant.bodies.len()).map(|j| place(StateKind::Bristle(j))).collect(),
             stretch,
             speed,
             angle,
@@ -256,10 +257,10 @@ impl Frame {
         let mut matrix = DMatrix::zeros(n, n);
         for (i, kind) in self.kinds.iter().enumerate() {
             let row = match *kind {
-                Kind::Angle(j) => other.angle[j].clone(),
-                Kind::Stretch(j) => other.stretch[j].clone(),
-                Kind::Speed(j) => other.speed[j].clone(),
-                Kind::Current(_) | Kind::Bristle(_) => {
+                StateKind::Angle(j) => other.angle[j].clone(),
+                StateKind::Stretch(j) => other.stretch[j].clone(),
+                StateKind::Speed(j) => other.speed[j].clone(),
+                StateKind::Current(_) | StateKind::Bristle(_) => {
                     DVector::from_fn(n, |j, _| f64::from(u8::from(other.kinds[j] == *kind)))
                 }
             };
@@ -275,17 +276,17 @@ fn moving(plant: &Mechanism, held: &[bool]) -> Vec<usize> {
 }
 
 /// Currents that are states.
-fn currents(plant: &Mechanism) -> impl Iterator<Item = Kind> + '_ {
-    (0..CURRENTS).filter(|number| plant.drive_of_current(*number).is_some()).map(Kind::Current)
+fn currents(plant: &Mechanism) -> impl Iterator<Item = StateKind> + '_ {
+    (0..CURRENTS).filter(|number| plant.drive_of_current(*number).is_some()).map(StateKind::Current)
 }
 
 /// Bristles that are states.
-fn bristles(plant: &Mechanism, held: &[bool], speed: f64) -> Vec<Kind> {
+fn bristles(plant: &Mechanism, held: &[bool], speed: f64) -> Vec<StateKind> {
     let forward = speed >= 0.0;
     let has = |body: &usize| {
         let friction = &plant.bodies[*body].friction;
         let v = speed.abs() / plant.bodies[*body].kind.lever();
         matches!(friction.law, Law::LuGre { .. }) && friction.dry(forward, v) > 0.0 && !held[*body]
     };
-    plant.held_bodies().filter(has).map(Kind::Bristle).collect()
+    plant.held_bodies().filter(has).map(StateKind::Bristle).collect()
 }

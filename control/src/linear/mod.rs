@@ -29,7 +29,7 @@ pub use frame::Variable;
 pub use model::{Operation, StateSpace, System, placed};
 pub use natural::{ElasticMode, Natural, RigidMode};
 pub use response::{Range, Response, Transfer};
-pub use travel::{Place, place, places, travel, undamped};
+pub use travel::{ResonancesAt, place, places, travel, undamped};
 pub(crate) use words::assumptions;
 pub use words::sticks;
 pub use zeros::Zeros;

@@ -12,7 +12,7 @@
 use super::{Root, eigen};
 use crate::error::{Error, Result};
 use crate::friction::Motion;
-use crate::mechanism::{AmplifierMode, BODIES, Kind, Mechanism, Mode, Phases, SpringLaw};
+use crate::mechanism::{AmplifierMode, BODIES, Mechanism, Mode, MotionKind, Phases, SpringLaw};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
 
@@ -127,7 +127,7 @@ impl Natural {
                 }
             })
             .collect();
-        let slides = |i: usize| mechanism.bodies[bodies[i]].kind == Kind::Linear;
+        let slides = |i: usize| mechanism.bodies[bodies[i]].kind == MotionKind::Linear;
         let rigid = rigid(&shapes.columns(0, free).into_owned(), &slides);
         let rigid = rigid.into_iter().map(|(i, shape)| RigidMode { body: bodies[i], shape }).collect();
         Ok(Self { rigid, elastic, poles, bodies })

@@ -13,7 +13,7 @@ const STILL: f64 = 0.98;
 
 /// Resonances at one position. All frequencies in Hz, the lowest first.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Place {
+pub struct ResonancesAt {
     /// Position of the cart, m.
     pub position: f64,
     /// Position of the bridge, m, if any.
@@ -46,7 +46,7 @@ pub fn places(machine: &Machine, count: usize) -> Option<Vec<f64>> {
 }
 
 /// Resonances with the cart at each of `positions`, m, otherwise at `operation`.
-pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Result<Vec<Place>> {
+pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Result<Vec<ResonancesAt>> {
     let bare = undamped(machine);
     let mut drives_held = operation;
     machine.geometry().drives.iter().for_each(|drive| drives_held.held[drive.pulley] = true);
@@ -60,7 +60,7 @@ pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Res
         };
         let hertz = |roots: Vec<Root>| roots.into_iter().filter_map(Root::hertz).collect();
         let held = placed(machine, Operation { position, ..operation })?;
-        Ok(Place {
+        Ok(ResonancesAt {
             position,
             bridge: machine.bridge.as_ref().map(|_| operation.bridge),
             stiffness: held.belt.stiffness,
@@ -99,7 +99,7 @@ fn compliance(machine: &Machine) -> Vec<f64> {
 }
 
 /// Resonances at the position of `operation`.
-pub fn place(machine: &Machine, operation: Operation) -> Result<Place> {
+pub fn place(machine: &Machine, operation: Operation) -> Result<ResonancesAt> {
     Ok(travel(machine, operation, &[operation.position])?.swap_remove(0))
 }
 

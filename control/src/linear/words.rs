@@ -3,7 +3,7 @@
 use super::Operation;
 use crate::friction::Law;
 use crate::machine::{BeltModel, DriveUnit, Machine};
-use crate::mechanism::{AmplifierMode, Kind, Mechanism, Phases};
+use crate::mechanism::{AmplifierMode, Mechanism, MotionKind, Phases};
 use crate::number::engineering_typed;
 
 /// Operating point and assumptions: a sentence for each nonlinear part of the machine.
@@ -211,7 +211,7 @@ fn curves(plant: &Mechanism, operation: Operation, moving: &[usize]) -> Vec<Stri
         let part = &plant.bodies[body];
         let friction = part.friction;
         let speed = operation.speed / part.kind.lever();
-        let (name, unit) = (part.label.name, if part.kind == Kind::Linear { "N s/m" } else { "N m s/rad" });
+        let (name, unit) = (part.label.name, if part.kind == MotionKind::Linear { "N s/m" } else { "N m s/rad" });
         match friction.law {
             Law::Coulomb => None,
             Law::LuGre { .. } if operation.speed == 0.0 => {

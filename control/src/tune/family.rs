@@ -10,7 +10,7 @@ use crate::chance::{quantile, uniform};
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::linear::{Operation, Place, places, travel};
+use crate::linear::{Operation, ResonancesAt, places, travel};
 use crate::machine::Machine;
 use crate::number::engineering;
 use crate::parameter::{self, Free, kinds};
@@ -435,7 +435,7 @@ fn following(mut machine: Machine) -> Machine {
 }
 
 /// Resonance and anti-resonance of a machine at these positions of its cart, with the bridge at `bridge`, m.
-pub(super) fn modes_along(machine: &Machine, bridge: f64, places: &[f64]) -> Result<Vec<Place>> {
+pub(super) fn modes_along(machine: &Machine, bridge: f64, places: &[f64]) -> Result<Vec<ResonancesAt>> {
     travel(&following(machine.clone()), Operation { bridge, ..Operation::default() }, places)
 }
 

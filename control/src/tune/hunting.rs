@@ -221,14 +221,14 @@ struct Swing {
 
 /// A recorded oscillation of a sliding part, its positions (m) over time (s), and the final command, with its slope if
 /// it is a ramp.
-struct Seen {
+struct ObservedSwing {
     swing: Option<Swing>,
     slides: Vec<Vec<(f64, f64)>>,
     command: f64,
     slope: Option<f64>,
 }
 
-impl Seen {
+impl ObservedSwing {
     /// Time until the command of a stuck axis reaches its breakaway, and time from one breakaway to the other, s; none
     /// if the command does not move towards it, or with several drives.
     fn next(&self, machine: &Machine) -> Option<(f64, f64)> {
@@ -265,7 +265,7 @@ fn seen(
     model: &Machine,
     start: f64,
     (watched, skipped): (f64, f64),
-) -> Result<Seen> {
+) -> Result<ObservedSwing> {
     let limits = Limits { speed: SPEED, acceleration: 0.2, jerk: None, snap: None };
     // From 0, towards the longer side of the travel.
     let reversal = |slide: &Slide| {
@@ -298,7 +298,7 @@ fn seen(
     let late = samples.iter().filter(|sample| sample.drive == 0 && sample.time >= until - 0.125 * watched);
     let command: Vec<(f64, f64)> = late.map(|sample| (sample.time, sample.given)).collect();
     let command_now = command.last().map_or(0.0, |(_, given)| *given);
-    Ok(Seen { swing: widest(&slides, swung), slides, command: command_now, slope: slope(&command) })
+    Ok(ObservedSwing { swing: widest(&slides, swung), slides, command: command_now, slope: slope(&command) })
 }
 
 /// The largest oscillation of the slides.

@@ -17,7 +17,7 @@ use super::loops::{Break, Open, breaks, smallest};
 use super::plant::{Plant, Sampled, Square, by_drives};
 use super::winding::Winding;
 use crate::control::feedback::{Feedback, Turn};
-use crate::machine::Kind;
+use crate::machine::MachineKind;
 use nalgebra::Complex;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
@@ -81,7 +81,7 @@ pub struct Margins {
     /// True if the loop is the same at every break, since the controller of a drive uses a single measurement.
     pub has_one_loop: bool,
     /// The kind of machine, whose drives these are.
-    pub kind: Kind,
+    pub kind: MachineKind,
     /// First frequency at which |L| of the loop that follows the reference falls below 1, rad/s.
     pub crossover: f64,
     /// First frequency at which |S| of that loop rises above 1/√2, rad/s.

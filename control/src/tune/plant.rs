@@ -5,7 +5,7 @@ use crate::control::measures_cart;
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::linear::{Discrete, Hold, Operation, Range, StateSpace, System};
-use crate::machine::{EncoderPlace, Kind, Machine};
+use crate::machine::{EncoderPlace, Machine, MachineKind};
 use nalgebra::{Complex, SMatrix};
 use std::f64::consts::PI;
 
@@ -39,7 +39,7 @@ pub struct Plant {
     pub(super) every: f64,
     /// Poles outside the unit circle.
     pub(super) unstable: usize,
-    pub(super) kind: Kind,
+    pub(super) kind: MachineKind,
     pub(super) of: ByDrives,
 }
 

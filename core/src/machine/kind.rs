@@ -5,7 +5,7 @@ use super::{axis, dual_belt, gantry};
 
 /// The kinds of machines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum MachineKind {
     /// One drive, one cart, one belt.
     Axis,
     /// A cart on a bridge, one belt round both drive pulleys.
@@ -16,17 +16,18 @@ pub enum Kind {
     DualBelt,
 }
 
-impl Kind {
+impl MachineKind {
     /// All of them.
-    pub const ALL: [Kind; 4] = [Kind::Axis, Kind::HFrame, Kind::CoreXy, Kind::DualBelt];
+    pub const ALL: [MachineKind; 4] =
+        [MachineKind::Axis, MachineKind::HFrame, MachineKind::CoreXy, MachineKind::DualBelt];
 
     /// Its geometry.
     pub const fn geometry(self) -> &'static Geometry {
         match self {
-            Kind::Axis => &axis::AXIS,
-            Kind::HFrame => &gantry::H_FRAME,
-            Kind::CoreXy => &gantry::CORE_XY,
-            Kind::DualBelt => &dual_belt::DUAL_BELT,
+            MachineKind::Axis => &axis::AXIS,
+            MachineKind::HFrame => &gantry::H_FRAME,
+            MachineKind::CoreXy => &gantry::CORE_XY,
+            MachineKind::DualBelt => &dual_belt::DUAL_BELT,
         }
     }
 
@@ -55,7 +56,7 @@ mod tests {
     #[test]
     fn constants_of_a_geometry_follow_from_its_arms() {
         let r = 0.02;
-        for kind in Kind::ALL {
+        for kind in MachineKind::ALL {
             let geometry = kind.geometry();
             let turns = |body: usize| matches!(geometry.bodies[body].part, Part::DrivePulley | Part::IdlerPulley);
             // Without strain no span is stretched, and positions by the drives are exact.

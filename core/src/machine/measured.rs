@@ -1,6 +1,6 @@
 //! Measurable quantities of a machine, and positions from the slide coordinates of a geometry.
 
-use super::{EncoderPlace, Geometry, Kind, Machine, Part};
+use super::{EncoderPlace, Geometry, Machine, MachineKind, Part};
 
 /// Measurable quantities; the recorder of an axis supports those up to [`Quantity::CartSpeed`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -130,11 +130,11 @@ const OF_DUAL_BELT: [Quantity; 18] = [
 
 impl Quantity {
     /// Quantities of a kind of machine, in the order of a log.
-    pub const fn of(kind: Kind) -> &'static [Quantity] {
+    pub const fn of(kind: MachineKind) -> &'static [Quantity] {
         match kind {
-            Kind::Axis => &OF_AXIS,
-            Kind::HFrame | Kind::CoreXy => &OF_GANTRY,
-            Kind::DualBelt => &OF_DUAL_BELT,
+            MachineKind::Axis => &OF_AXIS,
+            MachineKind::HFrame | MachineKind::CoreXy => &OF_GANTRY,
+            MachineKind::DualBelt => &OF_DUAL_BELT,
         }
     }
 
@@ -294,7 +294,7 @@ mod tests {
         for (k, quantity) in all.iter().enumerate() {
             assert!(all[..k].iter().all(|other| other.name() != quantity.name()), "{}", quantity.name());
         }
-        for kind in Kind::ALL {
+        for kind in MachineKind::ALL {
             let geometry = kind.geometry();
             for quantity in Quantity::of(kind).iter().filter(|quantity| quantity.is_position()) {
                 assert_eq!(geometry.by_slides(*quantity, 0.02).len(), geometry.slides.len(), "{}", quantity.name());
@@ -305,7 +305,7 @@ mod tests {
     #[test]
     fn positions_go_with_the_slides_as_equations_of_the_geometry_have_it() {
         // r φ₁ = −x − y, r φ₂ = x − y
-        let weights = |quantity| Kind::HFrame.geometry().by_slides(quantity, 0.5);
+        let weights = |quantity| MachineKind::HFrame.geometry().by_slides(quantity, 0.5);
         assert_eq!(weights(LeftAngle), [-2.0, -2.0]);
         assert_eq!(weights(RightRotorAngle), [2.0, -2.0]);
         assert_eq!(weights(BridgePosition), [1.0, 0.0]);

@@ -43,7 +43,7 @@ impl Machine {
                 });
                 bodies.push(Body {
                     label: at.rotor,
-                    kind: mechanism::Kind::Rotary { radius: self.pulley_radius },
+                    kind: mechanism::MotionKind::Rotary { radius: self.pulley_radius },
                     // n² J_r: seen from behind the gear
                     inertia: unit.motor.gear_ratio * unit.motor.gear_ratio * unit.motor.rotor_inertia,
                     friction: Friction::default(),
@@ -92,8 +92,8 @@ impl Machine {
                 }
                 _ => None,
             };
-            let turns = mechanism::Kind::Rotary { radius: self.pulley_radius };
-            let slides = mechanism::Kind::Linear;
+            let turns = mechanism::MotionKind::Rotary { radius: self.pulley_radius };
+            let slides = mechanism::MotionKind::Linear;
             let bridge = self.bridge.as_ref().unwrap_or(&self.cart);
             let (kind, inertia, friction, slide) = match part {
                 Part::DrivePulley => (turns, self.drive_pulley.inertia, self.drive_pulley.friction, None),
@@ -114,7 +114,7 @@ impl Machine {
         };
         let yaw = self.yaw.iter().map(|yaw| Body {
             label: YAW,
-            kind: mechanism::Kind::Rotary { radius: yaw.arm() },
+            kind: mechanism::MotionKind::Rotary { radius: yaw.arm() },
             inertia: yaw.inertia,
             friction: Friction::default(),
             force: 0.0,
@@ -259,7 +259,7 @@ impl Machine {
             add(at.voltage.key.into(), "V", Shown::Voltage(drive), true);
         }
         for (body, BodyAt { label, .. }) in bodies.iter().enumerate() {
-            let way = if mechanism.bodies[body].kind == mechanism::Kind::Linear { "position" } else { "angle" };
+            let way = if mechanism.bodies[body].kind == mechanism::MotionKind::Linear { "position" } else { "angle" };
             let [of_way, of_speed, _] = units(body);
             add(format!("{}_{way}", label.key), of_way, Shown::Position(body, 1.0), true);
             add(format!("{}_speed", label.key), of_speed, Shown::Speed(body, 1.0), true);

@@ -1,7 +1,7 @@
 //! Rigid model: an axis as one mass along its belt.
 
 use super::{AmplifierMode, DriveUnit, Machine, SlideAt};
-use crate::calculator::{Calculator, Number, Run, at_least, less, more};
+use crate::calculator::{Calculator, Evaluation, Number, at_least, less, more};
 use crate::signal::profile::Reference;
 
 /// Largest speed of a reference that counts as rest, m/s, and largest acceleration that counts as none, m/s²: what
@@ -124,7 +124,7 @@ impl Rigid {
     /// Motor current, A, and terminal voltage, V, that give `force` (N, changing at `rate`, N/s), the rotor's own
     /// included, while the drive pulley moves like this.
     pub fn electrical(&self, force: f64, rate: f64, drive: &Reference) -> (f64, f64) {
-        self.electrical_by(&mut Run::plain(), force, rate, drive)
+        self.electrical_by(&mut Evaluation::plain(), force, rate, drive)
     }
 
     /// As the function without `_by`, for any calculator.
@@ -192,7 +192,7 @@ impl Rigid {
     /// Command, V or A, for `force` (N, changing at `rate`, N/s), the rotor's own included, while the drive pulley moves
     /// like this.
     pub fn command(&self, force: f64, rate: f64, drive: &Reference) -> f64 {
-        self.command_by(&mut Run::plain(), force, rate, drive)
+        self.command_by(&mut Evaluation::plain(), force, rate, drive)
     }
 
     /// As the function without `_by`, for any calculator.
@@ -249,7 +249,7 @@ impl Rigid {
 
     /// Viscous and dry friction of the axis at this speed, N; `sign` is the direction of the dry part.
     pub fn friction(&self, speed: f64, sign: f64) -> (f64, f64) {
-        self.friction_by(&mut Run::plain(), speed, sign)
+        self.friction_by(&mut Evaluation::plain(), speed, sign)
     }
 
     /// As the function without `_by`, for any calculator.

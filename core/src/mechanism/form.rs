@@ -166,7 +166,7 @@ impl Sub for Form {
 mod tests {
     use super::*;
     use crate::chance::uniform;
-    use crate::mechanism::{Body, Kind, Label, Spring, SpringLaw};
+    use crate::mechanism::{Body, Label, MotionKind, Spring, SpringLaw};
     use rand_pcg::Pcg64;
 
     /// Two bodies on a spring.
@@ -174,7 +174,7 @@ mod tests {
         let label = Label { key: "part", name: "part" };
         let body = |index: usize| Body {
             label,
-            kind: Kind::Linear,
+            kind: MotionKind::Linear,
             inertia: 1.0,
             friction: Default::default(),
             force: 0.0,

@@ -9,7 +9,7 @@
 //! c = (r φ₁ − x,  x − x₀,  x − r φ₃,  φ_r − φ₁)
 //! ```
 
-use super::{BODIES, CURRENTS, DRIVES, Form, Kind, Mechanism, SPRINGS, SpringLaw, State};
+use super::{BODIES, CURRENTS, DRIVES, Form, Mechanism, MotionKind, SPRINGS, SpringLaw, State};
 
 /// Coefficients up to this fraction of those they come from are zero except for rounding.
 const NOTHING: f64 = 1e-12;
@@ -99,7 +99,7 @@ impl Layout {
             }
             // The yaw of a bridge is a coordinate by itself.
             let turns = |&b: &usize| {
-                left[b] != 0.0 && matches!(mechanism.bodies[b].kind, Kind::Rotary { .. }) && layout.yaw != Some(b)
+                left[b] != 0.0 && matches!(mechanism.bodies[b].kind, MotionKind::Rotary { .. }) && layout.yaw != Some(b)
             };
             match (0..bodies).find(turns) {
                 // The row becomes a coordinate and replaces a pulley that hangs on it.

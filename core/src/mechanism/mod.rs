@@ -30,9 +30,9 @@ pub use mode::{Cause, Contact, DriveMode, Guard, Limit, Mode, Part, Status, Swit
 pub use phases::{PhaseRate, Phases, Steady};
 pub use power::Power;
 pub use ride::{Ridden, Ride, RideLaw, Riding};
-pub use transition::{After, Next, Place, Resets, Then, Transition};
+pub use transition::{After, Next, Resets, StateQuantity, Then, Transition};
 
-use crate::calculator::{Calculator, Run};
+use crate::calculator::{Calculator, Evaluation};
 use crate::friction::Friction;
 use crate::polyline::Polyline;
 use std::borrow::Cow;
@@ -66,7 +66,7 @@ pub struct Body {
     /// Its name.
     pub label: Label,
     /// Rotary (rad) or linear (m).
-    pub kind: Kind,
+    pub kind: MotionKind,
     /// Moment of inertia, kg m², or mass, kg, without the rotor.
     pub inertia: f64,
     /// Its friction, N m over rad/s or N over m/s.
@@ -83,7 +83,7 @@ pub struct Body {
 
 /// Kind of motion of a body.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kind {
+pub enum MotionKind {
     /// It turns; the belt runs over it at this pitch radius, m.
     Rotary {
         /// m
@@ -93,20 +93,20 @@ pub enum Kind {
     Linear,
 }
 
-impl Kind {
+impl MotionKind {
     /// Displacement at the belt per displacement of the body: its pitch radius, or 1.
     pub fn lever(self) -> f64 {
         match self {
-            Kind::Rotary { radius } => radius,
-            Kind::Linear => 1.0,
+            MotionKind::Rotary { radius } => radius,
+            MotionKind::Linear => 1.0,
         }
     }
 
     /// Units of position, speed and force (or torque) of the body.
     pub fn units(self) -> [&'static str; 3] {
         match self {
-            Kind::Rotary { .. } => ["rad", "rad/s", "N m"],
-            Kind::Linear => ["m", "m/s", "N"],
+            MotionKind::Rotary { .. } => ["rad", "rad/s", "N m"],
+            MotionKind::Linear => ["m", "m/s", "N"],
         }
     }
 }
@@ -202,7 +202,7 @@ pub struct Follows {
 impl Follows {
     /// k = E A / l                                                                  (11)
     pub fn stiffness(&self, position: impl Fn(usize) -> f64) -> f64 {
-        self.stiffness_by(&mut Run::plain(), |body| Some(position(body)))
+        self.stiffness_by(&mut Evaluation::plain(), |body| Some(position(body)))
     }
 
     /// As [`Follows::stiffness`], for any calculator; bodies without a position are at zero.

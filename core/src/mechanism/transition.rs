@@ -57,7 +57,7 @@ pub enum Resets {
 
 /// A quantity of the state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum StateQuantity {
     /// Speed of a body.
     Speed(usize),
     /// Current of a drive, by the number of its winding.
@@ -81,14 +81,16 @@ pub enum After {
 
 impl Resets {
     /// The quantities, and their values.
-    pub fn each(self, mechanism: &Mechanism) -> impl Iterator<Item = (Place, f64)> + '_ {
+    pub fn each(self, mechanism: &Mechanism) -> impl Iterator<Item = (StateQuantity, f64)> + '_ {
         let (leader, current) = match self {
             Resets::None => (None, None),
             Resets::Speeds(body) => (Some(body), None),
-            Resets::Current(drive, value) => (None, Some((Place::Current(mechanism.first_current(drive)), value))),
+            Resets::Current(drive, value) => {
+                (None, Some((StateQuantity::Current(mechanism.first_current(drive)), value)))
+            }
         };
         let speeds = leader.into_iter().flat_map(|body| mechanism.followers(body));
-        speeds.map(|body| (Place::Speed(body), 0.0)).chain(current)
+        speeds.map(|body| (StateQuantity::Speed(body), 0.0)).chain(current)
     }
 }
 

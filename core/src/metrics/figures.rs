@@ -2,7 +2,7 @@
 //! the studio are made from it: a new figure is one row here.
 
 use super::{Metrics, Peak};
-use crate::machine::{DriveAt, Geometry, Kind, Machine};
+use crate::machine::{DriveAt, Geometry, Machine, MachineKind};
 use crate::mechanism::Label;
 
 /// The role of a part of a machine.
@@ -263,7 +263,7 @@ fn parts(geometry: &Geometry, role: Role) -> Vec<(&'static str, String)> {
 }
 
 /// The key figures of a kind of machine with these extras, in the order of the list, then of the parts.
-pub fn figures(kind: Kind, extras: Extras) -> Vec<Figure> {
+pub fn figures(kind: MachineKind, extras: Extras) -> Vec<Figure> {
     let geometry = kind.geometry();
     let has = move |row: &&FigureRow| match row.only {
         None => true,
@@ -275,7 +275,7 @@ pub fn figures(kind: Kind, extras: Extras) -> Vec<Figure> {
     let of_parts = |row: &'static FigureRow| {
         parts(geometry, row.role).into_iter().enumerate().map(move |(place, (part, name))| {
             let by_role = row.name.replace('*', part);
-            let own = row.of_axis.filter(|_| kind == Kind::Axis);
+            let own = row.of_axis.filter(|_| kind == MachineKind::Axis);
             Figure {
                 name: own.map_or_else(|| by_role.clone(), |[name, _]| name.to_string()),
                 by_role,
@@ -297,7 +297,7 @@ mod tests {
     /// The cart of a dual belt and its motor each have a peak speed; both were named `peak_cart_speed`.
     #[test]
     fn no_two_figures_of_a_kind_share_a_name() {
-        for kind in Kind::ALL {
+        for kind in MachineKind::ALL {
             let mut names: Vec<String> =
                 figures(kind, Extras { stepper: true, yaw: true }).into_iter().map(|figure| figure.name).collect();
             let count = names.len();

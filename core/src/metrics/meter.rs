@@ -16,7 +16,7 @@ use std::sync::Arc;
 
 /// Source of a peak: a reading, or a sum of readings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Place {
+enum PeakSource {
     /// Index of a reading, and the factor to the quantity.
     Reading(usize, f64),
     /// Index of a sum.
@@ -31,16 +31,16 @@ type Sum = Vec<(usize, f64)>;
 struct Places {
     /// Bodies other than rotors.
     bodies: usize,
-    load_speeds: Vec<Place>,
-    load_errors: Vec<Place>,
+    load_speeds: Vec<PeakSource>,
+    load_errors: Vec<PeakSource>,
     /// Speeds of the drive pulleys at the pitch circle; only for a machine with one drive.
-    belt_speeds: Vec<Place>,
-    shaft_speeds: Vec<Place>,
-    currents: Vec<Place>,
-    stretches: Vec<Place>,
+    belt_speeds: Vec<PeakSource>,
+    shaft_speeds: Vec<PeakSource>,
+    currents: Vec<PeakSource>,
+    stretches: Vec<PeakSource>,
     /// Of a bridge that yaws.
-    yaw: Option<Place>,
-    forces: Vec<Place>,
+    yaw: Option<PeakSource>,
+    forces: Vec<PeakSource>,
     sums: Vec<Sum>,
     /// Independent rotors, and the readings of their speeds.
     rotors: Vec<(usize, usize)>,
@@ -52,7 +52,7 @@ impl Places {
     fn of(machine: &Machine, mechanism: &Mechanism) -> Self {
         let geometry = machine.geometry();
         let find = |wanted: Shown| mechanism.readings.iter().position(|shown| *shown == wanted);
-        let place = |wanted: Shown| find(wanted).map_or(Place::Sum(usize::MAX), |q| Place::Reading(q, 1.0));
+        let place = |wanted: Shown| find(wanted).map_or(PeakSource::Sum(usize::MAX), |q| PeakSource::Reading(q, 1.0));
         let mut sums: Vec<Sum> = Vec::new();
         // An elongation without a reading is a sum of those with one.
         let yaw = machine.yaw_spring().and_then(|spring| find(Shown::Stretch(spring))).zip(machine.yaw);
@@ -63,24 +63,24 @@ impl Places {
                 let term = |&(span, weight): &(usize, f64)| Some((find(Shown::Stretch(span))?, weight));
                 let of_yaw = yaw.map(|(reading, yaw)| (reading, yaw.arm() * geometry.left_to_yaw(on_yaw, terms)));
                 sums.push(terms.iter().filter_map(term).chain(of_yaw.filter(|(_, weight)| *weight != 0.0)).collect());
-                Place::Sum(sums.len() - 1)
+                PeakSource::Sum(sums.len() - 1)
             }
         };
         let load_errors = geometry.slides.iter().map(|slide| summed(slide.error, 0.0)).collect();
         let stretches = (0..geometry.spans.len()).map(|span| match place(Shown::Stretch(span)) {
-            read @ Place::Reading(..) => read,
-            Place::Sum(_) => summed(geometry.spans[span].by_others, geometry.spans[span].on_yaw),
+            read @ PeakSource::Reading(..) => read,
+            PeakSource::Sum(_) => summed(geometry.spans[span].by_others, geometry.spans[span].on_yaw),
         });
         let stretches = stretches.collect();
-        let yaw = yaw.map(|(reading, _)| Place::Reading(reading, 1.0));
-        let belt_speeds: Vec<Place> = match &mechanism.drives[..] {
+        let yaw = yaw.map(|(reading, _)| PeakSource::Reading(reading, 1.0));
+        let belt_speeds: Vec<PeakSource> = match &mechanism.drives[..] {
             [drive] => vec![place(Shown::Speed(drive.pulley, machine.pulley_radius))],
             _ => Vec::new(),
         };
         let shafts = mechanism.drives.iter().enumerate().map(|(number, drive)| match belt_speeds.get(number) {
             // Behind a stiff gear the shaft turns with the pulley, whose speed is already followed.
-            Some(&Place::Reading(q, _)) if drive.shaft == drive.pulley => {
-                Place::Reading(q, 1.0 / machine.pulley_radius)
+            Some(&PeakSource::Reading(q, _)) if drive.shaft == drive.pulley => {
+                PeakSource::Reading(q, 1.0 / machine.pulley_radius)
             }
             _ => place(Shown::Speed(drive.shaft, 1.0)),
         });
@@ -106,7 +106,7 @@ impl Places {
     }
 
     /// Sources of a figure, for all parts of its role.
-    fn sought(&self, seek: Seek) -> &[Place] {
+    fn sought(&self, seek: Seek) -> &[PeakSource] {
         match seek {
             Seek::LoadSpeed => &self.load_speeds,
             Seek::LoadError => &self.load_errors,
@@ -157,8 +157,8 @@ impl Sought {
             for (number, place) in places.sought(seek).iter().enumerate() {
                 match *place {
                     _ if part.is_some_and(|part| part != number) => {}
-                    Place::Reading(q, _) => readings[q] = true,
-                    Place::Sum(_) => sums = true,
+                    PeakSource::Reading(q, _) => readings[q] = true,
+                    PeakSource::Sum(_) => sums = true,
                 }
             }
         }
@@ -289,10 +289,10 @@ impl Meter {
     pub fn finish(self, events: &[Event]) -> Metrics {
         let (places, machine, state) = (&*self.sought.places, &self.machine, &self.state);
         let geometry = machine.geometry();
-        let peak = |place: Option<&Place>| match place.copied() {
-            Some(Place::Reading(q, 1.0)) => self.peaks[q],
-            Some(Place::Reading(q, factor)) => Peak { value: factor * self.peaks[q].value, ..self.peaks[q] },
-            Some(Place::Sum(sum)) => self.sums.get(sum).copied().unwrap_or_default(),
+        let peak = |place: Option<&PeakSource>| match place.copied() {
+            Some(PeakSource::Reading(q, 1.0)) => self.peaks[q],
+            Some(PeakSource::Reading(q, factor)) => Peak { value: factor * self.peaks[q].value, ..self.peaks[q] },
+            Some(PeakSource::Sum(sum)) => self.sums.get(sum).copied().unwrap_or_default(),
             None => Peak::default(),
         };
         let mut counts = vec![EventCount::default(); places.bodies];

@@ -1,7 +1,7 @@
 //! Location of a parameter in a machine, with access to it.
 
 use crate::friction::{Friction, Law, Shape, decay_of_velocity, velocity_of_decay};
-use crate::machine::{Amplifier, AmplifierMode, Belt, BeltModel, Kind, Machine, Motor, SimpleDrive};
+use crate::machine::{Amplifier, AmplifierMode, Belt, BeltModel, Machine, MachineKind, Motor, SimpleDrive};
 
 /// Location of a parameter in a machine.
 #[derive(Debug, Clone, Copy)]
@@ -73,7 +73,7 @@ pub enum List {
     /// `cart.friction.along.0.factor`: a list of points.
     Points,
     /// `left_drive.motor.resistance`, `right_drive.motor.resistance`: one for each drive. `motor.resistance` sets all.
-    Drives(Kind),
+    Drives(MachineKind),
     /// `bridge.mass`, `cart.mass`: one for each slide, with the bridge's key in the table.
     Slides,
 }

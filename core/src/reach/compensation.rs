@@ -1,6 +1,6 @@
 //! Feed-forward from the reference alone, for a rigid axis and for one with an elastic belt.
 
-use crate::calculator::{Calculator, Number, Run, less, more};
+use crate::calculator::{Calculator, Evaluation, Number, less, more};
 use crate::design::{FeedForward, FeedForwardModel};
 use crate::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid, side};
 use crate::machine::{BeltModel, EncoderPlace, GearPlay, Machine};
@@ -8,7 +8,7 @@ use crate::signal::profile::Reference;
 
 /// Direction in which the axis moves, or is about to move: 1, −1 or 0.
 pub fn direction(reference: &Reference) -> f64 {
-    direction_by(&mut Run::plain(), reference)
+    direction_by(&mut Evaluation::plain(), reference)
 }
 
 /// As the function without `_by`, for any calculator.
@@ -70,7 +70,7 @@ impl Compensation {
 
     /// Motion of the pulleys for which the cart follows `y`: quasi-static for the idler's own mode, exact otherwise.
     pub fn needed(&self, y: &Reference) -> Needed {
-        self.needed_by(&mut Run::plain(), y)
+        self.needed_by(&mut Evaluation::plain(), y)
     }
 
     /// As the function without `_by`, for any calculator.

@@ -3,7 +3,7 @@
 use super::compensation::{Compensation, direction};
 use super::forward::Forward;
 use super::pull_out::Curve;
-use crate::calculator::Run;
+use crate::calculator::Evaluation;
 use crate::design::{Bounds, FeedForward, FeedForwardModel};
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Belt, BeltModel, Machine};
@@ -280,7 +280,13 @@ fn needs_of_drive(machine: &Machine, drive: usize, profiles: &[Profile], instant
         let slides: Vec<Reference> = profiles.iter().map(|profile| profile.at(time)).collect();
         let (current, voltage) = forward.electrical(&slides);
         let (force, spans) = (forward.force(&slides), [0.0; 3]);
-        Need { at: Instant { time, y: forward.along(&mut Run::plain(), &slides) }, force, current, voltage, spans }
+        Need {
+            at: Instant { time, y: forward.along(&mut Evaluation::plain(), &slides) },
+            force,
+            current,
+            voltage,
+            spans,
+        }
     };
     (0..=instants).map(need).collect()
 }

@@ -1,7 +1,7 @@
 //! Feed-forward for each drive of a machine with several, from the references of all sliding parts.
 
 use super::compensation::{direction_by, twist};
-use crate::calculator::{Calculator, Number, Run};
+use crate::calculator::{Calculator, Evaluation, Number};
 use crate::design::{FeedForward, FeedForwardModel};
 use crate::machine::rigid::Rigid;
 use crate::machine::{EncoderPlace, Machine};
@@ -131,7 +131,7 @@ impl Forward {
 
     /// Motor force at the belt for the motion of a rigid belt, N.
     pub fn force(&self, slides: &[Reference]) -> f64 {
-        self.share_of_force(&mut Run::plain(), slides, self.shares())[0]
+        self.share_of_force(&mut Evaluation::plain(), slides, self.shares())[0]
     }
 
     /// The factors on inertia and friction.
@@ -204,7 +204,7 @@ impl Forward {
 
     /// Motor current, A, and terminal voltage, V, for the force with a rigid belt.
     pub fn electrical(&self, slides: &[Reference]) -> (f64, f64) {
-        let c = &mut Run::plain();
+        let c = &mut Evaluation::plain();
         let [force, rate] = self.share_of_force(c, slides, self.shares());
         let along = self.along(c, slides);
         self.pulley.electrical(force, rate, &self.accelerated(along))

@@ -96,7 +96,7 @@ impl Share {
 
 /// Path of a move from leg to leg, without its limits.
 #[derive(Debug, Clone)]
-pub struct Way {
+pub struct MovePath {
     /// Start position of each coordinate, m.
     pub start: Vec<f64>,
     /// Its legs, with arbitrary limits.
@@ -109,7 +109,7 @@ pub struct Way {
 /// Placeholder limits of a leg.
 const ANY: Limits = Limits { speed: 1.0, acceleration: 1.0, jerk: None, snap: None };
 
-impl Way {
+impl MovePath {
     /// Legs of references on one clock; none if the references do not move.
     pub fn of(profiles: &[Profile]) -> Option<Self> {
         let mut rested = 0.0;
@@ -165,7 +165,7 @@ pub struct Quickest<'a> {
 
 impl Quickest<'_> {
     /// Errors: a path that is infeasible at any speed and acceleration, and one that nothing limits.
-    pub fn check(&self, way: &Way) -> Result<()> {
+    pub fn check(&self, way: &MovePath) -> Result<()> {
         let slow = Limits { speed: 1e-3, acceleration: 1e-2, jerk: None, snap: None };
         let references = self.design.shaped(&way.within(&slow)?);
         let short = shortfalls(self.machine, self.design.bounds(), &references);
@@ -209,7 +209,7 @@ impl Quickest<'_> {
     /// each limit.
     pub fn limits_for(
         &self,
-        way: &Way,
+        way: &MovePath,
         periods: [u8; 2],
         share: Share,
         others: &dyn Fn(&[Profile]) -> Vec<Load>,
@@ -242,7 +242,7 @@ impl Quickest<'_> {
 
     /// Limits of the quickest move with these averaging times within a share of the machine's limits; none if no move
     /// is.
-    fn searched(&self, way: &Way, periods: [u8; 2], share: Share) -> Option<Limits> {
+    fn searched(&self, way: &MovePath, periods: [u8; 2], share: Share) -> Option<Limits> {
         let times = self.times(periods)?;
         let both: f64 = times.iter().sum();
         // T₂ = v/a ≥ T_j + T_s and D ≥ 2 a (T_j + T_s)²: a shorter stroke would shorten the jerk time.
@@ -305,7 +305,7 @@ impl Quickest<'_> {
     }
 
     /// True if a move within these limits uses at most these fractions of the limits of the machine.
-    fn is_within(&self, way: &Way, limits: &Limits, share: Share) -> bool {
+    fn is_within(&self, way: &MovePath, limits: &Limits, share: Share) -> bool {
         let Ok(profiles) = way.within(limits) else { return false };
         let loads = loads(self.machine, self.design.bounds(), &self.design.shaped(&profiles), INSTANTS);
         loads.iter().all(|load| load.share() <= share.of(load))

@@ -6,7 +6,7 @@ use super::Course;
 use crate::error::{Error, Result};
 use crate::friction::Law;
 use crate::machine::axis::CART;
-use crate::machine::{BeltModel, Kind, Machine};
+use crate::machine::{BeltModel, Machine, MachineKind};
 use crate::mechanism::{AmplifierMode, BODIES_AND_DRIVES, Mechanism, SpringLaw, State};
 use crate::parameter;
 use crate::plan::Experiment;
@@ -26,7 +26,7 @@ const MOST_ROWS: f64 = 1e12;
 
 /// Rejects an invalid machine.
 pub fn machine(machine: &Machine) -> Result<()> {
-    if machine.kind != Kind::Axis {
+    if machine.kind != MachineKind::Axis {
         parameter::check(machine)?;
         return machine.check_gantry();
     }

@@ -6,7 +6,7 @@ use crate::machine::Machine;
 
 /// The name of a solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum SolverKind {
     /// [`Solver::Exact`]
     Exact,
     /// [`Solver::General`]
@@ -19,7 +19,7 @@ pub enum Kind {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Choice {
     /// Default: the solver that the machine needs.
-    pub solver: Option<Kind>,
+    pub solver: Option<SolverKind>,
     /// Position tolerance of the general solver, m.
     pub tolerance: Option<f64>,
     /// Step of Table 3, s.
@@ -33,8 +33,8 @@ impl Choice {
     /// the command line; Table 3 is for an axis only.
     pub fn solver(&self, machine: &Machine) -> Result<Solver> {
         let option = match (self.solver, self.step, self.method) {
-            _ if machine.kind == crate::machine::Kind::Axis => return self.instead_of(Solver::of(machine)),
-            (Some(Kind::Table3), _, _) => "--solver table3",
+            _ if machine.kind == crate::machine::MachineKind::Axis => return self.instead_of(Solver::of(machine)),
+            (Some(SolverKind::Table3), _, _) => "--solver table3",
             (_, Some(_), _) => "--step",
             (_, _, Some(_)) => "--method",
             _ => return self.instead_of(Solver::of(machine)),
@@ -46,11 +46,11 @@ impl Choice {
 
     fn instead_of(&self, usual: Solver) -> Result<Solver> {
         let solver = match (self.solver, usual) {
-            (Some(Kind::Table3), _) => {
+            (Some(SolverKind::Table3), _) => {
                 Solver::Table3 { step: self.step.unwrap_or(1e-4), method: self.method.unwrap_or_default() }
             }
-            (Some(Kind::Exact), _) => Solver::Exact,
-            (Some(Kind::General), _) => Solver::GENERAL,
+            (Some(SolverKind::Exact), _) => Solver::Exact,
+            (Some(SolverKind::General), _) => Solver::GENERAL,
             (None, solver) => solver,
         };
         let misplaced = |option: &str, what: &str, other: &str| {

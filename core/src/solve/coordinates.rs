@@ -165,7 +165,7 @@ impl Coordinates {
 mod tests {
     use super::*;
     use crate::machine::axis::{CART, DRIVE, IDLER};
-    use crate::mechanism::{Body, Kind, Label, Mechanism, Spring, SpringLaw};
+    use crate::mechanism::{Body, Label, Mechanism, MotionKind, Spring, SpringLaw};
 
     /// Two pulleys and a cart on three spans, as the paper's axis.
     fn mechanism() -> (Mechanism, f64) {
@@ -181,8 +181,9 @@ mod tests {
             leader: (index, 1.0),
             is_rotor: false,
         };
-        let turns = Kind::Rotary { radius: r };
-        let bodies = vec![body(DRIVE, turns, 6.3e-5), body(CART, Kind::Linear, 0.362), body(IDLER, turns, 3.3e-5)];
+        let turns = MotionKind::Rotary { radius: r };
+        let bodies =
+            vec![body(DRIVE, turns, 6.3e-5), body(CART, MotionKind::Linear, 0.362), body(IDLER, turns, 3.3e-5)];
         let arms = [[(DRIVE, r), (CART, -1.0)], [(CART, 1.0), (IDLER, -r)], [(IDLER, r), (DRIVE, -r)]];
         let spring = |arms: [(usize, f64); 2]| Spring {
             label,

@@ -250,12 +250,12 @@ fn ends_alike(first: Ending, second: Ending) -> bool {
 }
 
 /// A column of positions, and its lever.
-struct Way<'a> {
+struct PositionColumn<'a> {
     values: &'a [f64],
     lever: f64,
 }
 
-impl Way<'_> {
+impl PositionColumn<'_> {
     /// At the belt, m; NaN for a missing row.
     fn at(&self, row: usize) -> f64 {
         self.values.get(row).map_or(f64::NAN, |value| self.lever * value)
@@ -263,15 +263,15 @@ impl Way<'_> {
 }
 
 /// The columns of these positions.
-fn columns<'a>(ways: &[(String, f64)], block: &'a Trajectory) -> Vec<Way<'a>> {
-    ways.iter().map(|(name, lever)| Way { values: block.get(name).unwrap_or(&[]), lever: *lever }).collect()
+fn columns<'a>(ways: &[(String, f64)], block: &'a Trajectory) -> Vec<PositionColumn<'a>> {
+    ways.iter().map(|(name, lever)| PositionColumn { values: block.get(name).unwrap_or(&[]), lever: *lever }).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::friction::{Friction, Law, Shape, Side};
-    use crate::machine::{Amplifier, AmplifierMode, Belt, BeltModel, DriveUnit, Kind, Motor, Pulley, Slide};
+    use crate::machine::{Amplifier, AmplifierMode, Belt, BeltModel, DriveUnit, MachineKind, Motor, Pulley, Slide};
     use crate::mechanism::State;
     use crate::solve::simulate;
 
@@ -301,7 +301,7 @@ mod tests {
         let mut slide = Slide::new(0.65359, cart.following(gaussian));
         slide.load = -0.1463;
         Machine {
-            kind: Kind::Axis,
+            kind: MachineKind::Axis,
             drives: vec![DriveUnit { motor, amplifier: Amplifier::ideal(AmplifierMode::Voltage, 1.1517) }],
             pulley_radius: 0.021866,
             drive_pulley: Pulley { inertia: 1.0467e-5, friction: drive.following(bristles) },

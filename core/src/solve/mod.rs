@@ -27,7 +27,7 @@ mod table3;
 mod widest;
 
 pub use crate::trajectory::Grid;
-pub use choice::{Choice, Kind};
+pub use choice::{Choice, SolverKind};
 pub use estimate::ErrorEstimate;
 pub use exact::{Job, Receive};
 pub use general::{Dynamics, Quantity};

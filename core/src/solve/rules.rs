@@ -8,7 +8,7 @@ use super::pace::most_events;
 use super::saved::{Pass, Passed};
 use super::{Ending, Event, Tie};
 use crate::friction::Motion;
-use crate::mechanism::{After, Cause, Mechanism, Mode, Next, Part, Place, Status, Then, Transition, What};
+use crate::mechanism::{After, Cause, Mechanism, Mode, Next, Part, StateQuantity, Status, Then, Transition, What};
 use std::sync::Arc;
 
 /// The rank of conditions on bodies.
@@ -100,7 +100,7 @@ pub(super) trait Between {
     /// True if the speed of a body decays asymptotically, so that rounding decides when it reaches zero.
     fn dies_out(&mut self, body: usize) -> bool;
     /// Sets a quantity of the state.
-    fn put(&mut self, place: Place, value: f64);
+    fn put(&mut self, place: StateQuantity, value: f64);
     /// Switches to the equations of the present mode.
     fn take_up_mode(&mut self);
 }

@@ -49,7 +49,7 @@ impl<'a> Make for OfExact<'_, 'a> {
 
     fn make<const N: usize>(self) -> Self::Made {
         let Self { mechanism, space, start, known, output } = self;
-        Box::new(exact::Run::<N>::new(mechanism, space, start, known, output))
+        Box::new(exact::ExactRun::<N>::new(mechanism, space, start, known, output))
     }
 }
 
@@ -135,7 +135,7 @@ impl<'a> Run<'a> {
             Solver::General { tolerance } => {
                 let fastest = check::fastest_rate(mechanism);
                 general::check(fastest, start.until, tolerance)?;
-                Box::new(general::Run::new(mechanism, start, (tolerance, fastest), output.within()))
+                Box::new(general::GeneralRun::new(mechanism, start, (tolerance, fastest), output.within()))
             }
             Solver::Table3 { .. } => {
                 return Err(Error::new("the paper's Table 3 has a fixed step and no sampled input")

@@ -1,7 +1,7 @@
 //! `modelDescription.xml`, of FMI 2.0 and 3.0.
 
 use super::{BINARY, sources};
-use super::{Causality, Kind, Model, Role, Variability, Variable};
+use super::{Causality, FmiType, Model, Role, Variability, Variable};
 use crate::error::Result;
 use crate::quantity::{self, Dimension};
 use crate::signal::DEGREE;
@@ -199,10 +199,12 @@ fn variable(xml: &mut String, model: &Model, all: &[&Variable], variable: &Varia
         let _ = write!(own, " derivative=\"{}\"", state.unwrap_or_default());
     }
     let _ = match (version, variable.kind) {
-        (Version::Two, Kind::Real) => writeln!(xml, "    <ScalarVariable {attributes}><Real{own}/></ScalarVariable>"),
-        (Version::Two, Kind::Whole) => writeln!(xml, "    <ScalarVariable {attributes}><Integer/></ScalarVariable>"),
-        (Version::Three, Kind::Real) => writeln!(xml, "    <Float64 {attributes}{own}/>"),
-        (Version::Three, Kind::Whole) => writeln!(xml, "    <Int32 {attributes}/>"),
+        (Version::Two, FmiType::Real) => {
+            writeln!(xml, "    <ScalarVariable {attributes}><Real{own}/></ScalarVariable>")
+        }
+        (Version::Two, FmiType::Whole) => writeln!(xml, "    <ScalarVariable {attributes}><Integer/></ScalarVariable>"),
+        (Version::Three, FmiType::Real) => writeln!(xml, "    <Float64 {attributes}{own}/>"),
+        (Version::Three, FmiType::Whole) => writeln!(xml, "    <Int32 {attributes}/>"),
     };
 }
 

@@ -17,7 +17,7 @@ pub use model::Model;
 pub use pack::{Carried, object_in, pack};
 pub use resource::resource;
 pub use sources::sources;
-pub use variable::{Causality, Kind, Role, Variability, Variable};
+pub use variable::{Causality, FmiType, Role, Variability, Variable};
 
 /// Where the machine stands in the archive.
 pub(crate) const MACHINE: &str = "resources/machine.toml";

@@ -1,6 +1,6 @@
 //! The variables of a machine: the one list that its description is written from and its shared object works by.
 
-use super::variable::{Kind, Role, Variable, named, plain, rate_unit, typed, typical, words};
+use super::variable::{FmiType, Role, Variable, named, plain, rate_unit, typed, typical, words};
 use super::{REFERENCES, resource};
 use crate::case::Case;
 use crate::chance::hash;
@@ -307,8 +307,8 @@ impl Model {
         for (column, heading) in mechanism.columns.iter().enumerate().filter(|(_, h)| h.shown != Shown::Time) {
             let quantity = self.quantities.iter().position(|(quantity, _)| shows(heading, *quantity, mechanism));
             let kind = match heading.shown {
-                Shown::Motion(_) | Shown::Contact(_) => Kind::Whole,
-                _ => Kind::Real,
+                Shown::Motion(_) | Shown::Contact(_) => FmiType::Whole,
+                _ => FmiType::Real,
             };
             // A column may be named as an input is: the voltage of a drive without limits.
             let name = heading.name.to_string();

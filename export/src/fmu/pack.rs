@@ -1,6 +1,6 @@
 //! The archive: description, shared object, sources, resources, documentation.
 
-use super::{Archive, BINARY, Causality, Kind, MACHINE, Model, Variability, Version};
+use super::{Archive, BINARY, Causality, FmiType, MACHINE, Model, Variability, Version};
 use super::{description, platform, sources};
 use crate::case::Case;
 use crate::error::{Error, Result};
@@ -126,7 +126,7 @@ fn page(model: &Model, version: Version) -> String {
             write!(text, "<h2>{heading}</h2>\n<table>\n<tr><th>name</th><th>unit</th><th>start</th><th></th></tr>\n");
         for variable in model.variables.iter().filter(|v| v.causality() == causality) {
             let start = variable.start.map(|start| format!("{start}")).unwrap_or_default();
-            let unit = if variable.kind == Kind::Whole { "whole number" } else { variable.unit };
+            let unit = if variable.kind == FmiType::Whole { "whole number" } else { variable.unit };
             let tunable = if variable.variability() == Variability::Tunable { " Tunable." } else { "" };
             let _ = writeln!(
                 text,

@@ -2,7 +2,7 @@
 //! inputs that rise at a rate, its variables as a table, and the functions of the standard around both, for
 //! co-simulation.
 
-use super::{BINARY, Causality, Kind, Model, Role, Variability, Variable, Version};
+use super::{BINARY, Causality, FmiType, Model, Role, Variability, Variable, Version};
 use crate::STEP;
 use crate::c;
 use crate::error::{Error, Result};
@@ -281,8 +281,8 @@ fn record(variable: &Variable, entry: &Entry) -> String {
         Causality::Independent | Causality::Local => "INNER",
     };
     let is_whole = match variable.kind {
-        Kind::Real => 0,
-        Kind::Whole => 1,
+        FmiType::Real => 0,
+        FmiType::Whole => 1,
     };
     format!(
         "{{{}U, {is_whole}U, {}U, {role}, {}, {}U, {}, {}, {:?}, {:?}, {:?}}}",

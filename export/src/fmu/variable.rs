@@ -19,7 +19,7 @@ pub struct Variable {
     /// Its part in the machine.
     pub role: Role,
     /// Real numbers, or whole ones.
-    pub kind: Kind,
+    pub kind: FmiType,
     /// The value it has unless another is set; of what follows from others, none.
     pub start: Option<f64>,
     /// Least and greatest value, where there are.
@@ -30,7 +30,7 @@ pub struct Variable {
 
 /// Real numbers, or whole ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum FmiType {
     /// Double precision.
     Real,
     /// 32 bits.
@@ -111,7 +111,7 @@ impl Variable {
         match (self.role, self.kind) {
             (Role::Parameter(_, true), _) => Variability::Tunable,
             (Role::Parameter(_, false), _) => Variability::Fixed,
-            (Role::Command(_), _) | (_, Kind::Whole) => Variability::Discrete,
+            (Role::Command(_), _) | (_, FmiType::Whole) => Variability::Discrete,
             _ if self.is_count() => Variability::Discrete,
             _ => Variability::Continuous,
         }
@@ -131,7 +131,7 @@ pub(super) fn plain(reference: u32, name: &str, description: &str, unit: &'stati
         unit,
         shown: String::new(),
         role,
-        kind: Kind::Real,
+        kind: FmiType::Real,
         start: None,
         range: None,
         quantity: None,

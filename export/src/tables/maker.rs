@@ -2,7 +2,7 @@
 
 use super::{Does, Element, ElementKind, MOST_ROWS, Row, TableGuard, Then};
 use crate::error::{Error, Result};
-use crate::mechanism::{After, Cause, Form, Layout, Mechanism, Mode, Place, State, Transition};
+use crate::mechanism::{After, Cause, Form, Layout, Mechanism, Mode, State, StateQuantity, Transition};
 
 /// How many modes are looked at to see what a row depends on.
 const LOOKS: u64 = 48;
@@ -191,10 +191,10 @@ impl Maker<'_> {
 
     /// A condition as far as it is known by itself.
     fn guard(&self, of: Option<(usize, usize)>, then: Then, transition: &Transition, row: Row) -> TableGuard {
-        let place = |(place, value): (Place, f64)| {
+        let place = |(place, value): (StateQuantity, f64)| {
             let place = match place {
-                Place::Speed(body) => Some(self.layout.speed[body]),
-                Place::Current(drive) => self.layout.current[drive],
+                StateQuantity::Speed(body) => Some(self.layout.speed[body]),
+                StateQuantity::Current(drive) => self.layout.current[drive],
             };
             place.map(|place| (place, value))
         };

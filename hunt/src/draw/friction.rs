@@ -1,6 +1,6 @@
 //! Friction of a random body: its values, and the law between rest and fast sliding.
 
-use super::{Draw, Feature, Kind, Sizes};
+use super::{Draw, Feature, Sizes, StageKind};
 use std::fmt::Write;
 
 impl Draw {
@@ -95,7 +95,7 @@ impl Draw {
         let backward = if asymmetric { side(self) } else { forward };
         self.faster(2.0 * forward[0].max(backward[0]) / (arm * arm * mass));
         if forward[2] > forward[1] || backward[2] > backward[1] {
-            self.kind(Kind::Static);
+            self.kind(StageKind::Static);
         }
         let [viscous, coulomb, at_rest] = forward;
         let mut text = match curve {
@@ -105,7 +105,7 @@ impl Draw {
         if curve.is_some() {
             text += &self.curve(sizes, (mass, arm), curve, forward);
         } else if backward != forward {
-            self.kind(Kind::Asymmetric);
+            self.kind(StageKind::Asymmetric);
             let [viscous, coulomb, at_rest] = backward;
             let _ = write!(
                 text,

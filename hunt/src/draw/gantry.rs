@@ -1,6 +1,6 @@
 //! A random gantry.
 
-use super::{Draw, Drawn, Feature, Kind, Sizes};
+use super::{Draw, Drawn, Feature, Sizes, StageKind};
 use std::fmt::Write;
 
 impl Draw {
@@ -70,7 +70,7 @@ impl Draw {
         if !stops && !self.wants(Feature::Follows) {
             return;
         }
-        self.kind(Kind::Travel);
+        self.kind(StageKind::Travel);
         let [low, high] = [(); 2].map(|()| sizes.way * self.random.decades(if stops { 0.01 } else { 1.5 }, 2.0));
         let (low, high) = (self.digits(-low), self.digits(high));
         let mut text = format!("min = {low:e}, max = {high:e}");
@@ -112,7 +112,7 @@ impl Draw {
         }
         let _ = writeln!(self.text, "damping = [{damping}]");
         if self.wants(Feature::Slack) {
-            self.kind(Kind::Slack);
+            self.kind(StageKind::Slack);
             let pretension = sizes.force * self.random.decades(0.01, 10.0);
             self.line("pretension", pretension.max(1e-14));
         }

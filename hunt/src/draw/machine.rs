@@ -1,6 +1,6 @@
 //! Motor, amplifier, bodies, belt and travel of a random stage.
 
-use super::{Draw, Feature, Kind, Random, Sizes};
+use super::{Draw, Feature, Random, Sizes, StageKind};
 use crate::by::By;
 use std::f64::consts::PI;
 use std::fmt::Write;
@@ -71,7 +71,7 @@ impl Draw {
         self.line("back_emf_constant", ke);
         self.line("resistance", resistance);
         if inductance > 0.0 {
-            self.kind(Kind::Inductance);
+            self.kind(StageKind::Inductance);
             self.line("inductance", inductance);
             self.faster(resistance / inductance);
         }
@@ -91,7 +91,7 @@ impl Draw {
         let volts = amperes * drive.resistance;
         self.table("amplifier");
         if drive.current_mode {
-            self.kind(Kind::Current);
+            self.kind(StageKind::Current);
             self.text.push_str("mode = \"current\"\n");
         }
         let gain = match self.random.chance(0.7) {
@@ -106,12 +106,12 @@ impl Draw {
         }
         let mut bound = f64::INFINITY;
         if drive.voltage_limit {
-            self.kind(Kind::Limits);
+            self.kind(StageKind::Limits);
             let limit = volts * self.random.decades(0.05, 3.0);
             self.line("voltage_limit", limit.max(1e-14));
         }
         if drive.current_limit {
-            self.kind(Kind::Limits);
+            self.kind(StageKind::Limits);
             let limit = amperes * self.random.decades(0.05, 3.0);
             bound = self.digits(limit.max(1e-14));
             self.line("current_limit", bound);
@@ -131,7 +131,7 @@ impl Draw {
             self.line("rotor_inertia", rotor * r * r / (n * n));
         }
         if play {
-            self.kind(Kind::Play);
+            self.kind(StageKind::Play);
             let k = sizes.stiffness[self.random.below(3)] * self.random.decades(0.1, 10.0);
             let light = rotor.min(sizes.mass[0]);
             let c =
@@ -142,7 +142,7 @@ impl Draw {
             self.line("backlash", backlash.min(6.0));
             self.faster((2.0 * k / light).sqrt().max(2.0 * c / light));
         } else if self.has(Feature::Losses, 0.35) {
-            self.kind(Kind::Losses);
+            self.kind(StageKind::Losses);
             let efficiency = if self.random.chance(0.2) { self.even(0.1, 0.5) } else { self.even(0.5, 0.999) };
             self.line("gear_efficiency", efficiency);
         }
@@ -192,7 +192,7 @@ impl Draw {
         }
         let _ = writeln!(self.text, "model = \"{}\"", sizes.model);
         if sizes.model != "rigid" && self.has(Feature::Slack, 0.25) {
-            self.kind(Kind::Slack);
+            self.kind(StageKind::Slack);
             let pretension = sizes.force * self.random.decades(0.01, 10.0);
             self.line("pretension", pretension.max(1e-14));
         }
@@ -215,7 +215,7 @@ impl Draw {
             0..11 => 0.0,
             11..16 => self.even(-1.0, 1.0),
             _ => {
-                self.kind(Kind::Far);
+                self.kind(StageKind::Far);
                 self.decades(1.0, 1000.0) * if self.random.chance(0.5) { -1.0 } else { 1.0 }
             }
         }
@@ -228,7 +228,7 @@ impl Draw {
         if (by_recipe && !self.wants(Feature::Line)) || (!by_recipe && !drawn) {
             return;
         }
-        self.kind(Kind::Lines);
+        self.kind(StageKind::Lines);
         let mut text = String::from("[cart]\n");
         for (key, middle, reach) in [("force_along", start, sizes.way), ("force_by_speed", 0.0, sizes.way / sizes.time)]
         {
@@ -257,7 +257,7 @@ impl Draw {
         if !stops && !self.wants(Feature::Follows) {
             return;
         }
-        self.kind(Kind::Travel);
+        self.kind(StageKind::Travel);
         let shortest = if stops { 0.01 } else { 2.0 };
         let [low, high] = [(); 2].map(|()| sizes.way * self.random.decades(shortest, if stops { 2.0 } else { 4.0 }));
         let (low, high) = (self.digits(start - low), self.digits(start + high));

@@ -30,7 +30,7 @@ pub mod least_squares {
 pub use crate::case::{drawn, machines};
 pub use crate::control::belts::Belts;
 pub use asked::problem::{Problem, Stop};
-pub use asked::run::{Extra, MeasuredOutput, Nuisance, Run};
+pub use asked::run::{Extra, FittedLog, MeasuredOutput, Nuisance};
 pub use check::{Check, check, check_watched};
 pub use compare::drift::{Change, Drift, drift};
 pub use limits::{EFFECTIVE, LEAST_SHOWN, MODEL_ERROR, R_HAT, UNDETERMINED};

@@ -15,7 +15,7 @@ pub use value::value;
 use taut::fit::{Fit, Posterior, Profile};
 
 /// A fit with its profiles and its posterior.
-pub struct Found {
+pub struct FitResults {
     /// The fit.
     pub fit: Fit,
     /// Profiles, where a report is written.

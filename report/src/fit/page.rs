@@ -1,18 +1,18 @@
 //! The report: one HTML file.
 
-use super::{Found, plots, posterior, rows as told, value};
+use super::{FitResults, plots, posterior, rows as told, value};
 use crate::{Callout, Cell, Page, Table};
 use taut::case::Case;
 use taut::fit::{Fit, Grade, LogFit, Profile, ResidualForce, Score, residual_force};
 use taut::log::Quantity;
 
 /// The page; `text` is the case with the estimates.
-pub fn page(case: &Case, found: &Found, text: &str) -> Page {
+pub fn page(case: &Case, found: &FitResults, text: &str) -> Page {
     page_with(case, found, text, |_| {})
 }
 
 /// The page of a fit with a part before it.
-pub fn page_with(case: &Case, found: &Found, text: &str, first: impl FnOnce(&mut Page)) -> Page {
+pub fn page_with(case: &Case, found: &FitResults, text: &str, first: impl FnOnce(&mut Page)) -> Page {
     let fit = &found.fit;
     let mut page = Page::new(case.title.clone()).subtitle("Parameters from logs.");
     first(&mut page);

@@ -4,7 +4,7 @@ use super::rows::words;
 use crate::{Axis, Colour, Figure, Map, Panel, Picture, Plane, Series, Style};
 use nalgebra::Complex;
 use std::f64::consts::PI;
-use taut::linear::{Analysis, ByInput, Place, ResonanceMap, Response, Root, StateSpace};
+use taut::linear::{Analysis, ByInput, ResonanceMap, ResonancesAt, Response, Root, StateSpace};
 use taut::machine::{Machine, Part};
 use taut::number::engineering;
 
@@ -125,13 +125,13 @@ fn response(
 }
 
 /// Resonance and anti-resonance over the cart's position.
-fn along(travel: &[Place]) -> Figure {
+fn along(travel: &[ResonancesAt]) -> Figure {
     let mut panel = Panel::new(Axis::new("Frequency", "Hz").logarithmic()).weight(1.4);
     let mut damping = Panel::new(Axis::new("Damping ratio", ""));
     let count = travel.iter().map(|place| place.resonances.len().max(place.antiresonances.len())).max().unwrap_or(0);
     let position = || -> Vec<f64> { travel.iter().map(|place| place.position).collect() };
     for (pick, word, style) in [
-        ((|place| &place.resonances) as fn(&Place) -> &Vec<Root>, "resonance", Style::Solid),
+        ((|place| &place.resonances) as fn(&ResonancesAt) -> &Vec<Root>, "resonance", Style::Solid),
         (|place| &place.antiresonances, "anti-resonance", Style::Dashed),
     ] {
         for k in 0..count {

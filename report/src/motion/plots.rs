@@ -1,7 +1,7 @@
 //! The plots of a move.
 
 use super::Done;
-use crate::simulate::{Named, Way, decimator};
+use crate::simulate::{ColumnPair, Named, decimator};
 use crate::{Axis, Colour, Decimator, Figure, Panel, Plane, Series, Style};
 use taut::machine::{DriveAt, Machine};
 use taut::mechanism::Label;
@@ -16,7 +16,7 @@ pub struct Curves {
     drives: Vec<(String, Vec<(String, f64)>)>,
     following: Vec<Decimator>,
     /// The path that was asked for and that of the cart, of a gantry.
-    paths: Option<[Way; 2]>,
+    paths: Option<[ColumnPair; 2]>,
     scratch: Vec<f64>,
     radius: f64,
 }
@@ -55,7 +55,7 @@ impl Curves {
             drives,
             paths: match &loads[..] {
                 [x, y] => {
-                    let path = |of: &dyn Fn(&str) -> String| Way::new([of(x), of(y)]);
+                    let path = |of: &dyn Fn(&str) -> String| ColumnPair::new([of(x), of(y)]);
                     Some([path(&reference), path(&|key| format!("{key}_position"))])
                 }
                 _ => None,

@@ -4,11 +4,11 @@ use super::plots::BELT;
 use super::rows::{mode_words, pair_words, remark, words};
 use crate::{Callout, Cell, Figure, Page, Table};
 use taut::control::compare::Comparison;
-use taut::control::recommendation::{Findings, Found};
+use taut::control::recommendation::{Findings, ShaperFile};
 
 /// The page.
 pub fn page(found: &Findings, figures: &[(String, Figure)]) -> Page {
-    let title = found.each.iter().map(Found::name).collect::<Vec<_>>().join(" and ");
+    let title = found.each.iter().map(ShaperFile::name).collect::<Vec<_>>().join(" and ");
     let mut page = Page::new(title).subtitle("Input shapers for what vibrates.");
     for (i, one) in found.each.iter().enumerate() {
         page.section(&one.name());
@@ -50,7 +50,7 @@ pub fn page(found: &Findings, figures: &[(String, Figure)]) -> Page {
     page
 }
 
-fn shapers(page: &mut Page, one: &Found) {
+fn shapers(page: &mut Page, one: &ShaperFile) {
     let corner = &one.criterion.corner;
     let mut rows = Table::new(format!(
         "Each shaper at its best frequency. Smoothing is at {} mm/s² and {} mm/s at corners; the acceleration is what smooths by \
@@ -72,7 +72,7 @@ fn shapers(page: &mut Page, one: &Found) {
     page.table(&rows);
 }
 
-fn pairs(page: &mut Page, one: &Found) {
+fn pairs(page: &mut Page, one: &ShaperFile) {
     let Some(told) = one.pair_told() else { return };
     page.prose(format!("{told}."));
     let Some(best) = one.choice.pairs.first() else { return };
@@ -86,7 +86,7 @@ fn pairs(page: &mut Page, one: &Found) {
     page.embed("The best pair for [controller] of a case", &best.line());
 }
 
-fn modes(page: &mut Page, one: &Found) {
+fn modes(page: &mut Page, one: &ShaperFile) {
     let left = one.left();
     if left.is_empty() {
         return;
@@ -108,7 +108,7 @@ fn modes(page: &mut Page, one: &Found) {
     page.table(&rows);
 }
 
-fn impulses(page: &mut Page, one: &Found) {
+fn impulses(page: &mut Page, one: &ShaperFile) {
     let best = one.choice.best();
     let mut rows = Table::new(format!("The impulses of {}.", best.shaper.form.name()));
     rows = rows.column("Time", "ms").column("Amplitude", "");

@@ -2,7 +2,7 @@
 
 use crate::{Axis, Colour, Figure, Panel, Series, Style};
 use taut::control::diagonals::Curve;
-use taut::control::recommendation::{Findings, Found, Source, damping};
+use taut::control::recommendation::{Findings, ShaperFile, Source, damping};
 use taut::control::shaping::Target;
 use taut::control::spectrum::Spectrum;
 use taut::reach::resonance::Resonance;
@@ -62,7 +62,7 @@ fn density() -> Axis {
 }
 
 /// The spectrum, what the recommended shaper leaves of it, and what each shaper leaves at each frequency.
-fn shaped(one: &Found, title: String, spectrum: &Spectrum) -> Figure {
+fn shaped(one: &ShaperFile, title: String, spectrum: &Spectrum) -> Figure {
     let f = &spectrum.frequency;
     let best = one.choice.best();
     let mut above = Panel::new(density())
@@ -92,7 +92,7 @@ fn colour(i: usize) -> Colour {
     Colour::CYCLE[i % Colour::CYCLE.len()]
 }
 
-fn responses(one: &Found, f: &[f64], dampings: &[f64]) -> Panel {
+fn responses(one: &ShaperFile, f: &[f64], dampings: &[f64]) -> Panel {
     let mut panel = Panel::new(Axis::new("Vibration left", "%").shown_as("%", 100.0));
     let (low, high) = (f.first().copied().unwrap_or(0.0), f.last().copied().unwrap_or(200.0));
     let fine: Vec<f64> = (0..=800).map(|k| low + (high - low) * f64::from(k) / 800.0).collect();
@@ -106,7 +106,7 @@ fn responses(one: &Found, f: &[f64], dampings: &[f64]) -> Panel {
 }
 
 /// The axes of the accelerometer.
-fn axes(one: &Found, spectrum: &Spectrum) -> Figure {
+fn axes(one: &ShaperFile, spectrum: &Spectrum) -> Figure {
     let mut panel = Panel::new(density());
     for (name, values) in ["x", "y", "z"].iter().zip(&spectrum.axes) {
         panel = panel.line(*name, &spectrum.frequency, values);
@@ -117,7 +117,7 @@ fn axes(one: &Found, spectrum: &Spectrum) -> Figure {
 }
 
 /// Frequencies of a model, and what shapers leave there.
-fn model(one: &Found, modes: &[Resonance]) -> Figure {
+fn model(one: &ShaperFile, modes: &[Resonance]) -> Figure {
     let high = modes.iter().filter(|mode| mode.share > 0.05).map(|mode| mode.frequency).fold(0.0, f64::max);
     // A line for each mode, from zero up.
     let (mut at, mut height) = (Vec::new(), Vec::new());
@@ -143,7 +143,7 @@ fn model(one: &Found, modes: &[Resonance]) -> Figure {
 
 /// Both spectra, each of its own height and to one scale.
 fn compared(found: &Findings, first: &Spectrum, second: &Spectrum) -> Figure {
-    let [a, b] = [&found.each[0], &found.each[1]].map(Found::name);
+    let [a, b] = [&found.each[0], &found.each[1]].map(ShaperFile::name);
     Figure::new("Compared", Axis::new("Frequency", "Hz"))
         .panel(Panel::new(density()).line(a, &first.frequency, &first.density).line(
             b,

@@ -1,7 +1,7 @@
 //! The overview of a machine in words.
 
 use taut::number::{engineering_typed, fixed, typed};
-use taut::overview::{Overview, Place, Row};
+use taut::overview::{FiguresAt, Overview, Row};
 
 /// A value as it is read: shares in per cent.
 pub fn value(row: &Row) -> String {
@@ -23,7 +23,7 @@ pub fn rows(overview: &Overview) -> Vec<Vec<String>> {
     }
     let has_held = overview.places.iter().any(|place| place.held.is_some());
     head.extend(has_held.then(|| "Drive held".to_string()));
-    let row = |place: &Place| {
+    let row = |place: &FiguresAt| {
         let mut row: Vec<String> = place.position.iter().map(|x| typed(&format!("{} mm", fixed(1e3 * x, 1)))).collect();
         row.extend(place.stretch.iter().map(|stretch| engineering_typed(*stretch, "m/N", 4)));
         for (hertz, ratio) in &place.modes {

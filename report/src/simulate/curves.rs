@@ -1,7 +1,7 @@
 //! The curves of a run, thinned out as its rows come, so that a plot of any run needs the same memory.
 
 use crate::Decimator;
-use taut::machine::{DriveAt, Kind, Machine};
+use taut::machine::{DriveAt, Machine, MachineKind};
 use taut::mechanism::Heading;
 use taut::trajectory::Trajectory;
 
@@ -22,7 +22,7 @@ type Source = (String, Vec<(String, f64)>);
 /// Every curve that a report can show.
 fn sources(machine: &Machine) -> Vec<Source> {
     match machine.kind {
-        Kind::Axis => of_axis(machine.pulley_radius),
+        MachineKind::Axis => of_axis(machine.pulley_radius),
         _ => in_plane(machine),
     }
 }
@@ -120,7 +120,7 @@ pub struct Curves {
     thinned: Vec<Decimator>,
     scratch: Vec<f64>,
     /// The way of the cart in its plane, where it has one.
-    way: Option<Way>,
+    way: Option<ColumnPair>,
 }
 
 impl Curves {
@@ -128,14 +128,14 @@ impl Curves {
     pub fn new(machine: &Machine) -> Self {
         let sources = sources(machine);
         let thinned = sources.iter().map(|_| decimator()).collect();
-        let way =
-            (machine.kind != Kind::Axis).then(|| Way::new(["cart_position", "bridge_position"].map(String::from)));
+        let way = (machine.kind != MachineKind::Axis)
+            .then(|| ColumnPair::new(["cart_position", "bridge_position"].map(String::from)));
         Self { sources, thinned, scratch: Vec::new(), way }
     }
 
     /// The cart's positions in its plane, y and x, where it has one.
     pub fn way(&self) -> Option<(Vec<f64>, Vec<f64>)> {
-        self.way.as_ref().map(Way::points)
+        self.way.as_ref().map(ColumnPair::points)
     }
 
     /// Takes the next rows.
@@ -175,7 +175,7 @@ impl Curves {
 }
 
 /// Where two columns go together, one over the other, thinned out by leaving out every second row as often as needed.
-pub struct Way {
+pub struct ColumnPair {
     columns: [String; 2],
     stride: usize,
     rows: usize,
@@ -183,7 +183,7 @@ pub struct Way {
     last: [f64; 2],
 }
 
-impl Way {
+impl ColumnPair {
     /// No points yet.
     pub fn new(columns: [String; 2]) -> Self {
         Self { columns, stride: 1, rows: 0, points: Vec::new(), last: [0.0; 2] }

@@ -1,13 +1,13 @@
 //! The plots of a run whose cart moves in a plane.
 
-use super::Run;
+use super::SimulatedExperiment;
 use super::marks;
 use crate::{Axis, Colour, Figure, Panel, Plane, Series, Style};
 use taut::case::Case;
 use taut::machine::DriveAt;
 
 /// Every plot of a run over time, in the order of a report; none if its curves were not kept.
-pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
+pub fn figures(case: &Case, run: &SimulatedExperiment) -> Vec<(&'static str, Figure)> {
     let Some(curves) = &run.curves else { return Vec::new() };
     let figure = |name: &str| Figure::new(format!("{}: {name}", run.experiment.name), Axis::new("Time", "s"));
     let panel = |axis: Axis, names: &[(&str, &str)]| {
@@ -114,7 +114,7 @@ pub fn figures(case: &Case, run: &Run) -> Vec<(&'static str, Figure)> {
 }
 
 /// The way of the cart in the plane; none if it was not kept.
-pub fn way(case: &Case, run: &Run) -> Option<Plane> {
+pub fn way(case: &Case, run: &SimulatedExperiment) -> Option<Plane> {
     let (y, x) = run.curves.as_ref()?.way()?;
     let millimetres = |name: &str| Axis::new(name, "m").shown_as("mm", 1e3);
     let mut plane = Plane::new(

@@ -5,7 +5,7 @@ use crate::decimate;
 use crate::embed::{Arrays, spacing};
 use serde_json::{Value, json};
 use taut::case::Case;
-use taut::machine::{Kind, Machine, Travel};
+use taut::machine::{Machine, MachineKind, Travel};
 
 /// Rows of a curve that a page holds for its machine. A screen shows fewer pictures in 8 s, the time of a first look.
 const ROWS: usize = 2000;
@@ -37,7 +37,7 @@ fn chosen((x, y): (Vec<f64>, Vec<f64>)) -> (Vec<f64>, Vec<f64>) {
 /// Quantities of the drawing, each with the curve of the report that gives it and a factor.
 fn moved(machine: &Machine) -> Vec<(String, String, f64)> {
     let own = |key: String| (key.clone(), key, 1.0);
-    if machine.kind != Kind::Axis {
+    if machine.kind != MachineKind::Axis {
         let geometry = machine.geometry();
         let angles = geometry.drives.iter().map(|drive| format!("{}_angle", geometry.label(drive.pulley).key));
         let spans = geometry.span_labels().map(|label| format!("{}_force", label.key));

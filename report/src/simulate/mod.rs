@@ -10,7 +10,7 @@ mod plots;
 pub(crate) mod rows;
 
 pub use band::Band;
-pub(crate) use curves::Way;
+pub(crate) use curves::ColumnPair;
 pub use curves::{Curves, Samples, decimator};
 pub use live::scene;
 pub(crate) use page::figures_table;
@@ -30,7 +30,7 @@ use taut::reduction::Reduction;
 use taut::solve;
 
 /// An experiment after it ran.
-pub struct Run<'a> {
+pub struct SimulatedExperiment<'a> {
     /// The experiment as the case has it.
     pub experiment: &'a Experiment,
     /// Its events, how it ended, what it cost.
@@ -53,7 +53,7 @@ pub struct Run<'a> {
     pub took: Duration,
 }
 
-impl Run<'_> {
+impl SimulatedExperiment<'_> {
     /// The entry of the summary.
     pub fn told(&self) -> Simulated<'_> {
         Simulated {

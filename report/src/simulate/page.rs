@@ -1,6 +1,6 @@
 //! The report: one HTML file.
 
-use super::Run;
+use super::SimulatedExperiment;
 use super::live::live;
 use super::plots::{Named, figures, way};
 use super::rows::{early_end, lines, machine};
@@ -18,7 +18,13 @@ const MOST_EVENTS: usize = 200;
 
 /// The page for these runs, and its pictures by the names of their files; `text` is the case that repeats them. With
 /// `is_live`, the page has the machine in motion for each run.
-pub fn report(case: &Case, text: &str, solver: Solver, runs: &[Run], is_live: bool) -> (Page, Vec<(String, Picture)>) {
+pub fn report(
+    case: &Case,
+    text: &str,
+    solver: Solver,
+    runs: &[SimulatedExperiment],
+    is_live: bool,
+) -> (Page, Vec<(String, Picture)>) {
     let mechanism = case.machine.mechanism();
     let mut page = Page::new(case.title.clone()).subtitle(how(solver));
     let mut pictures = Vec::new();
@@ -62,7 +68,7 @@ pub fn figures_table(lines: Vec<(impl Into<String>, String)>) -> Table {
 fn experiment(
     page: &mut Page,
     (case, mechanism, solver): (&Case, &Mechanism, Solver),
-    run: &Run,
+    run: &SimulatedExperiment,
     (figures, way): (&[Named], Option<&Plane>),
     is_live: bool,
 ) {
@@ -88,7 +94,7 @@ fn experiment(
 }
 
 /// Every key figure, from the list of them.
-fn all_figures(page: &mut Page, run: &Run, machine: &Machine) {
+fn all_figures(page: &mut Page, run: &SimulatedExperiment, machine: &Machine) {
     page.subsection("Key figures");
     let mut table = Table::new("").column("Figure", "").column("Value", "").column("At", "s");
     for figure in metrics::figures(machine.kind, metrics::Extras::of(machine)) {

@@ -1,6 +1,6 @@
 //! The plots of a run.
 
-use super::Run;
+use super::SimulatedExperiment;
 use super::curves::{Curves, Samples};
 use super::{in_plane, marks};
 use crate::{Axis, Colour, Figure, Panel, Picture, Plane, Series, Style};
@@ -10,7 +10,7 @@ use taut::case::Case;
 pub type Named = (&'static str, Figure);
 
 /// Every plot of a run, in the order of a report; none if its curves were not kept.
-pub fn figures(case: &Case, run: &Run) -> Vec<Named> {
+pub fn figures(case: &Case, run: &SimulatedExperiment) -> Vec<Named> {
     if !case.is_axis() {
         return in_plane::figures(case, run);
     }
@@ -126,7 +126,7 @@ impl Plot<'_> {
 }
 
 /// The way of the cart in its plane; none if it has none, or its curves were not kept.
-pub fn way(case: &Case, run: &Run) -> Option<Plane> {
+pub fn way(case: &Case, run: &SimulatedExperiment) -> Option<Plane> {
     if case.is_axis() { None } else { in_plane::way(case, run) }
 }
 

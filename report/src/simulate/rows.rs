@@ -1,6 +1,6 @@
 //! A run in words: rows of a name and a value, for page and terminal alike.
 
-use super::Run;
+use super::SimulatedExperiment;
 use super::band::Band;
 use crate::fit::outputs;
 use taut::machine::{BeltModel, DriveAt, Geometry, Machine, Slide, SlideAt};
@@ -48,7 +48,7 @@ pub fn time(seconds: f64) -> String {
 }
 
 /// How a run of this machine ended that did not reach its end.
-pub fn early_end(run: &Run, machine: &Machine) -> Option<String> {
+pub fn early_end(run: &SimulatedExperiment, machine: &Machine) -> Option<String> {
     // Whichever is nearest to an end of its travel, or beyond.
     let left = |(slide, load): &(&Slide, &OfLoad)| {
         slide.travel.map_or(f64::INFINITY, |travel| (load.position - travel.min).min(travel.max - load.position))
@@ -117,7 +117,7 @@ fn at(peak: Peak, unit: &str, text: String) -> String {
 }
 
 /// The key figures of a run of this machine with their names.
-pub fn lines(run: &Run, machine: &Machine, solver: Solver) -> Vec<(&'static str, String)> {
+pub fn lines(run: &SimulatedExperiment, machine: &Machine, solver: Solver) -> Vec<(&'static str, String)> {
     let (metrics, geometry) = (&run.metrics, machine.geometry());
     let one_drive = metrics.drives.len() == 1;
     let labels: Vec<&str> = geometry.slides.iter().map(|slide| geometry.label(slide.body).name).collect();

@@ -147,7 +147,7 @@ fn bode(work: &Work) -> Result<Figure> {
 
 /// A closed loop with its name, colour and style: frequencies, rad/s, and the way from the reference of what slides to
 /// what slides without feed-forward.
-type Way = (String, Colour, Style, Vec<f64>, Vec<Complex<f64>>);
+type LoopCurve = (String, Colour, Style, Vec<f64>, Vec<Complex<f64>>);
 
 /// The keys of the parts that slide, with styles.
 fn slides(machine: &Machine) -> impl Iterator<Item = (&'static str, Style)> {
@@ -162,7 +162,7 @@ fn of_slide(machine: &Machine, name: &str, key: &str) -> String {
 }
 
 /// The loops before and after on the nominal axis, those alone that are stable.
-fn ways(work: &Work) -> Result<Vec<Way>> {
+fn ways(work: &Work) -> Result<Vec<LoopCurve>> {
     let nominal = work.tuned.family.nominal();
     let both = [("before", &work.tuned.before, Colour::Amber), ("after", &work.tuned.after, Colour::Blue)];
     let mut all = Vec::new();

@@ -189,18 +189,18 @@ fn consistency(log: &Log, stage: &Machine, channels: &[Channel]) -> Vec<Note> {
         let ratio = slope(&way, &travel(&position.values)) * levers;
         if let Some(kind) = kind(ratio) {
             let (p, s) = (position.quantity.name(), speed.quantity.name());
-            let code = if matches!(kind, Kind::Sign) { "sign" } else { "unit" };
+            let code = if matches!(kind, RatioFault::Sign) { "sign" } else { "unit" };
             let text = match &kind {
-                Kind::Sign => format!(
+                RatioFault::Sign => format!(
                     "it moves against {s}: one of the two has the wrong sign; set scale = {{ {s} = -1 }}, or so for {p}"
                 ),
-                Kind::Factor(factor) => {
+                RatioFault::Factor(factor) => {
                     format!("it goes {factor} what {s} adds up to: is the unit of {p}, of {s} or of the time wrong?")
                 }
             };
             // Of a factor the times may be the reason, too.
             let sign = || Remedy::Ratio(position.quantity, speed.quantity, -1.0);
-            let remedy = matches!(kind, Kind::Sign).then(sign);
+            let remedy = matches!(kind, RatioFault::Sign).then(sign);
             notes.push(Note::new(code, Severity::Suspicion, text).on(p).mended_by(remedy));
         }
     }
@@ -235,13 +235,13 @@ fn beside_drives(log: &Log, stage: &Machine, channels: &[Channel]) -> Vec<Note> 
         let Some(kind) = kind(slope(&travel(&by_drives), &travel(&position.values))) else { continue };
         let drives = names.join(" and ");
         let (code, text) = match kind {
-            Kind::Sign => (
+            RatioFault::Sign => (
                 "sign",
                 format!(
                     "it moves against what {drives} give for it: two columns are swapped, or one has the wrong sign; set scale = {{ {name} = -1 }}, or so for an angle"
                 ),
             ),
-            Kind::Factor(factor) => (
+            RatioFault::Factor(factor) => (
                 "unit",
                 format!(
                     "it goes {factor} what {drives} give for it: is the unit of one of them wrong, or the pulleys' radius?"
@@ -271,21 +271,21 @@ fn slope(x: &[f64], y: &[f64]) -> f64 {
 }
 
 /// The fault of a ratio that should be one.
-enum Kind {
+enum RatioFault {
     Sign,
     Factor(String),
 }
 
-fn kind(ratio: f64) -> Option<Kind> {
+fn kind(ratio: f64) -> Option<RatioFault> {
     let size = ratio.abs();
     if ratio.is_nan() {
         return None;
     }
     if (0.5..2.0).contains(&size) {
-        return (ratio < 0.0).then_some(Kind::Sign);
+        return (ratio < 0.0).then_some(RatioFault::Sign);
     }
     let times = if size >= 1.0 { format!("{size:.4} times") } else { format!("1/{:.4} of", 1.0 / size) };
-    Some(Kind::Factor(times.replace(".0000", "")))
+    Some(RatioFault::Factor(times.replace(".0000", "")))
 }
 
 fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Machine, what: &str) -> Option<Note> {
@@ -298,14 +298,14 @@ fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Machine, what: 
         Some(Note::new(code, Severity::Suspicion, text).on(name).mended_by(remedy))
     };
     match kind(ratio)? {
-        Kind::Sign => note(
+        RatioFault::Sign => note(
             "sign",
             format!(
                 "it moves against {other}: one of the two has the wrong sign; set scale = {{ {other} = -1 }}, or so for {name}"
             ),
             Remedy::Ratio(b, o, -1.0),
         ),
-        Kind::Factor(_) if levers != 1.0 && (0.8..1.25).contains(&(1.0 / swapped)) => note(
+        RatioFault::Factor(_) if levers != 1.0 && (0.8..1.25).contains(&(1.0 / swapped)) => note(
             "swapped",
             format!(
                 "it and {other} seem to be swapped: exchanged, they agree with the pulley's radius of {}",
@@ -313,7 +313,7 @@ fn ratio_note(ratio: f64, base: &Output, other: &Output, stage: &Machine, what: 
             ),
             Remedy::Exchange(b, o),
         ),
-        Kind::Factor(factor) => {
+        RatioFault::Factor(factor) => {
             let next = match usual_factor(ratio, stage) {
                 Some(Factor::Gear) => format!(
                     "that is the gear ratio, and angles of the rotor count at the pulley: set scale = {{ {} = {} }}",

@@ -164,7 +164,7 @@ pub(super) struct Question<'a> {
 }
 
 /// Result for a cell.
-pub(super) enum Seen {
+pub(super) enum CellResult {
     /// All limits hold, and the loop has no pole on the unit circle.
     Holds,
     /// Not shown: a shorter interval of frequencies may suffice.
@@ -208,7 +208,7 @@ fn dot(form: &[Complex<f64>], channels: &[f64]) -> Complex<f64> {
 
 impl Question<'_> {
     /// Looks at the frequencies from `low` to `high`, in units of half the sampling rate.
-    pub fn look(&self, table: &Table, low: f64, high: f64) -> Seen {
+    pub fn look(&self, table: &Table, low: f64, high: f64) -> CellResult {
         let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
         let orders = &self.axis.orders;
         let most_power = orders.iter().copied().max().unwrap_or(1);
@@ -237,7 +237,7 @@ impl Question<'_> {
         alone.jets[0] = Jet::ONE;
         let bottom = self.form(table, &powers, &alone, [0.0; 2]).most(table);
         let closed = self.form(table, &powers, &whole, bottom);
-        let mut worst = Seen::Holds;
+        let mut worst = CellResult::Holds;
         for &at in self.breaks {
             // The two parts of Δ at this break.
             let outer = match at {
@@ -257,12 +257,12 @@ impl Question<'_> {
                     continue;
                 }
                 match shown(table, &closed, numerator, limit) {
-                    Seen::Holds => {}
-                    Seen::Violated => return Seen::Violated,
-                    seen @ Seen::TooLarge(_) => worst = seen,
-                    Seen::TooWide => {
-                        if matches!(worst, Seen::Holds) {
-                            worst = Seen::TooWide;
+                    CellResult::Holds => {}
+                    CellResult::Violated => return CellResult::Violated,
+                    seen @ CellResult::TooLarge(_) => worst = seen,
+                    CellResult::TooWide => {
+                        if matches!(worst, CellResult::Holds) {
+                            worst = CellResult::TooWide;
                         }
                     }
                 }
@@ -389,11 +389,11 @@ fn powers(sigma: f64, h: f64, count: usize) -> Vec<Jet> {
 type Node = [[Complex<f64>; 3]; 2];
 
 /// Checks |X| ≤ M |Δ|.
-fn shown(table: &Table, closed: &Form, numerator: &Form, limit: f64) -> Seen {
+fn shown(table: &Table, closed: &Form, numerator: &Form, limit: f64) -> CellResult {
     let channels = table.center.len();
     let [center, top] = [closed, numerator].map(|form| dot(&form.still, &table.center));
     if modulus(top) > limit * BEYOND * modulus(center) + closed.other * limit + numerator.other {
-        return Seen::Violated;
+        return CellResult::Violated;
     }
     // Δ and X of each node, and their change along the interval.
     let at = |channels: &[f64]| {
@@ -404,15 +404,15 @@ fn shown(table: &Table, closed: &Form, numerator: &Form, limit: f64) -> Seen {
     let corners = nodes.iter().zip(&table.is_corner).filter(|(_, is_corner)| **is_corner);
     for (node, _) in corners {
         if modulus(node[1][0]) > limit * BEYOND * modulus(node[0][0]) + closed.other * limit + numerator.other {
-            return Seen::Violated;
+            return CellResult::Violated;
         }
     }
     let check = |is_still: bool| is_shown(&nodes, &minors, [center, top], [closed, numerator], limit, is_still);
     if check(false) {
-        return Seen::Holds;
+        return CellResult::Holds;
     }
     if check(true) {
-        return Seen::TooWide;
+        return CellResult::TooWide;
     }
     let weight =
         |linear: &Vec<f64>| limit * modulus(dot(&closed.still, linear)) + modulus(dot(&numerator.still, linear));
@@ -420,8 +420,8 @@ fn shown(table: &Table, closed: &Form, numerator: &Form, limit: f64) -> Seen {
     let most = (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b]));
     match most {
         // A single machine: its interval is all that is left.
-        None => Seen::TooWide,
-        Some(parameter) => Seen::TooLarge(parameter),
+        None => CellResult::TooWide,
+        Some(parameter) => CellResult::TooLarge(parameter),
     }
 }
 

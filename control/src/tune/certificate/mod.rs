@@ -18,7 +18,7 @@ use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::Result;
 use axis::Axis;
-use cells::{Question, Seen, Table};
+use cells::{CellResult, Question, Table};
 use tensor::Tensor;
 
 /// Budget of one proof, in nodes of polynomials that are evaluated, and largest number of proofs.
@@ -171,14 +171,14 @@ fn proven(question: &Question, polynomials: Tensor, stop: &dyn Fn() -> bool) -> 
             }
             budget -= table.effort();
             match question.look(&table, low, high) {
-                Seen::Holds => {}
-                Seen::Violated => return false,
-                Seen::TooLarge(parameter) => {
+                CellResult::Holds => {}
+                CellResult::Violated => return false,
+                CellResult::TooLarge(parameter) => {
                     votes[parameter] += (high - low) / high;
                     left.push([low, high]);
                 }
-                Seen::TooWide if high - low < NARROW * high => return false,
-                Seen::TooWide => {
+                CellResult::TooWide if high - low < NARROW * high => return false,
+                CellResult::TooWide => {
                     let middle = if low > 0.0 { 0.5 * (low + high) } else { 0.125 * high };
                     waiting.extend([[low, middle], [middle, high]]);
                 }

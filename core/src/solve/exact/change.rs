@@ -1,9 +1,9 @@
 //! Events of the exact solver: values and rounding of guards, loads, and the equations of a mode for the transition
 //! rules.
 
-use super::matrices::Room;
+use super::matrices::GuardBuffers;
 use super::{Core, ModeMatrices};
-use crate::mechanism::{Mechanism, Place, ROUNDING, Transition};
+use crate::mechanism::{Mechanism, ROUNDING, StateQuantity, Transition};
 use crate::solve::rules::{self, BEGUN, Between, Known, Load, MOMENT, Rules};
 use std::sync::Arc;
 
@@ -95,11 +95,11 @@ impl<const N: usize> Between for Core<N> {
         slows <= BEGUN * self.matrices.noise_of_rate(&sizes)[place]
     }
 
-    fn put(&mut self, place: Place, value: f64) {
+    fn put(&mut self, place: StateQuantity, value: f64) {
         let layout = &self.common.space.layout;
         let place = match place {
-            Place::Speed(body) => Some(layout.speed[body]),
-            Place::Current(drive) => layout.current[drive],
+            StateQuantity::Speed(body) => Some(layout.speed[body]),
+            StateQuantity::Current(drive) => layout.current[drive],
         };
         place.iter().for_each(|place| self.z[*place] = value);
     }
@@ -132,7 +132,7 @@ impl<const N: usize> Core<N> {
     /// True if a guard that is zero falls.
     fn falls_from_zero(&mut self, index: usize) -> bool {
         let law = &*self.matrices;
-        let Room { series, coefficients, .. } = &mut *self.room;
+        let GuardBuffers { series, coefficients, .. } = &mut *self.room;
         law.series(&self.z, law.reach(), series);
         let guard = &law.guards[index];
         let coefficients = guard.row.along(series, coefficients);

@@ -318,7 +318,7 @@ impl<const N: usize> Core<N> {
 mod tests {
     use super::*;
     use crate::friction::Friction;
-    use crate::mechanism::{Body, Cause, Kind, Label, Mechanism, Spring, SpringLaw, State};
+    use crate::mechanism::{Body, Cause, Label, Mechanism, MotionKind, Spring, SpringLaw, State};
     use crate::solve::exact::Space;
     use std::sync::Arc;
 
@@ -327,7 +327,7 @@ mod tests {
         let label = Label { key: "cart", name: "cart" };
         let cart = Body {
             label,
-            kind: Kind::Linear,
+            kind: MotionKind::Linear,
             inertia: 1.0,
             friction: Friction::symmetric(0.0, 1.0),
             force: 0.0,

@@ -11,7 +11,7 @@ use crate::signal::DEGREE;
 use crate::solve::propagator::{EXPONENTIAL_REACH, Matrix, SERIES_REACH, Series, series_order};
 use crate::solve::widest::widest;
 use guards::{Beside, LANES, Lanes, Row, Values, side_by_side};
-pub(super) use guards::{Room, Watch};
+pub(super) use guards::{GuardBuffers, Watch};
 pub(super) use shown::Shown;
 use std::sync::{Arc, OnceLock};
 

@@ -36,8 +36,8 @@ pub(super) use kernel::{Make, in_kernel};
 pub use lanes::{Job, Receive};
 pub(super) use lanes::{run_beside, takes};
 pub(super) use matrices::Space;
-use matrices::{ModeMatrices, Room, Size};
-pub(super) use run::Run;
+use matrices::{GuardBuffers, ModeMatrices, Size};
+pub(super) use run::ExactRun;
 pub(super) use sensitivity::Following;
 use std::sync::Arc;
 
@@ -58,7 +58,7 @@ pub(super) struct Core<const N: usize> {
     known: Modes<N>,
     /// Matrices that were there before.
     shared: u64,
-    room: Box<Room<N>>,
+    room: Box<GuardBuffers<N>>,
     /// Rounding errors of the state, for a machine in which they can grow.
     errors: Option<Box<Ellipsoid<N>>>,
     pub(super) common: Common,
@@ -155,7 +155,7 @@ impl<const N: usize> Core<N> {
         };
         let errors =
             matrices::can_grow(&common.mechanism).then(|| Box::new(Ellipsoid::new(common.space.layout.states)));
-        Self { z, largest: [0.0; N], matrices, known, shared, room: Box::new(Room::new()), errors, common }
+        Self { z, largest: [0.0; N], matrices, known, shared, room: Box::new(GuardBuffers::new()), errors, common }
     }
 
     pub(super) fn time(&self) -> f64 {
@@ -289,7 +289,7 @@ impl<const N: usize> Core<N> {
         }
         // g(τ) ≥ g − (|w| √2V + |w_u| |u̇|) τ − |w| |b| |u̇| τ²/2
         let grow = law.growth_factor();
-        let Room { size, value, steepness, bend, .. } = &mut *self.room;
+        let GuardBuffers { size, value, steepness, bend, .. } = &mut *self.room;
         law.steepness((*size, 0.0), grow, &self.common.input_rate, steepness);
         let push = law.push(&self.common.input_rate) * 0.5;
         let mut time = f64::INFINITY;
@@ -445,7 +445,7 @@ impl<const N: usize> Core<N> {
         let (mut open, mut falling) = (Lanes::NONE, Lanes::NONE);
         let grow = law.growth_over(length);
         let (input_rate, curvature) = (&self.common.input_rate, &self.common.input_curvature);
-        let Room { rate, size, value, steepness, slope, bend, .. } = &mut *self.room;
+        let GuardBuffers { rate, size, value, steepness, slope, bend, .. } = &mut *self.room;
         law.steepness((*size, law.push(input_rate) * length), grow, input_rate, steepness);
         for (lane, (g, steepness)) in value.iter().zip(&*steepness).enumerate().take(law.guards.len()) {
             open.set(lane, !(*g > steepness * length || (*g >= 0.0 && *steepness == 0.0)));
@@ -483,7 +483,7 @@ impl<const N: usize> Core<N> {
     fn advance_by_series_of(&mut self, law: &ModeMatrices<N>, distance: f64, open: Lanes) -> Option<Transition> {
         self.common.cost.series += 1;
         law.series(&self.z, distance, &mut self.room.series);
-        let Room { value, series, coefficients, .. } = &mut *self.room;
+        let GuardBuffers { value, series, coefficients, .. } = &mut *self.room;
         let along = |index: usize, room: &mut [f64; SERIES_TERMS]| {
             let coefficients = law.guards[index].row.along(series, room);
             coefficients[0] = value[index];
@@ -550,7 +550,7 @@ impl<const M: usize> Make for Smoothed<M> {
         let mut known = Vec::new();
         let (matrices, _) =
             ModeMatrices::of(&mut known, &common.mechanism, &common.space, &common.rules.mode, common.h);
-        let room = Box::new(Room::new());
+        let room = Box::new(GuardBuffers::new());
         let errors = errors.map(|errors| Box::new(errors.resized()));
         Box::new(Core::<N> { z, largest: [0.0; N], matrices, known, shared: 0, room, errors, common })
     }

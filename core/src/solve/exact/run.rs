@@ -13,7 +13,7 @@ use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
 use std::sync::Arc;
 
 /// A run in progress.
-pub(in crate::solve) struct Run<'a, const N: usize> {
+pub(in crate::solve) struct ExactRun<'a, const N: usize> {
     pub(super) core: Core<N>,
     grid: Grid,
     /// The present row, or the last one passed.
@@ -23,7 +23,7 @@ pub(in crate::solve) struct Run<'a, const N: usize> {
     known: Known,
 }
 
-impl<'a, const N: usize> Run<'a, N> {
+impl<'a, const N: usize> ExactRun<'a, N> {
     /// A run that begins in `start`.
     pub(in crate::solve) fn new(
         mechanism: &Arc<Mechanism>,
@@ -207,7 +207,7 @@ impl<'a, const N: usize> Run<'a, N> {
     }
 }
 
-impl<const N: usize> Running for Run<'_, N> {
+impl<const N: usize> Running for ExactRun<'_, N> {
     fn set_input(&mut self, pieces: &Pieces) {
         self.core.note_ties();
         self.core.set_input(pieces);

@@ -1,7 +1,7 @@
 //! Observation of a run: every interval, and more closely if a peak may lie within.
 
 use super::matrices::Shown;
-use super::{ModeMatrices, Run};
+use super::{ExactRun, ModeMatrices};
 use crate::mechanism::{BODIES, Transition};
 use crate::solve::observe::{Closer, Curve, FEW, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch, reading_of};
 use std::sync::Arc;
@@ -114,7 +114,7 @@ impl<const N: usize> Watching<N> {
     }
 }
 
-impl<const N: usize> Run<'_, N> {
+impl<const N: usize> ExactRun<'_, N> {
     /// True if an observer follows the motion.
     pub(super) fn is_observed(&self) -> bool {
         self.watching.follows

@@ -2,7 +2,7 @@
 //! mode.
 
 use super::Core;
-use crate::mechanism::{Cause, Mechanism, Place, Transition};
+use crate::mechanism::{Cause, Mechanism, StateQuantity, Transition};
 use crate::solve::rules::{BEGUN, Between, Known, Load, MOMENT, Rules};
 use std::sync::Arc;
 
@@ -105,10 +105,10 @@ impl Between for Core {
         rate[place].abs() * self.moment <= self.absolute[place]
     }
 
-    fn put(&mut self, place: Place, value: f64) {
+    fn put(&mut self, place: StateQuantity, value: f64) {
         let place = match place {
-            Place::Speed(body) => Some(self.model.speed(body)),
-            Place::Current(drive) => self.model.current[drive],
+            StateQuantity::Speed(body) => Some(self.model.speed(body)),
+            StateQuantity::Current(drive) => self.model.current[drive],
         };
         place.iter().for_each(|place| self.y[*place] = value);
     }

@@ -37,16 +37,16 @@ use super::saved::{Pass, Passed};
 use super::{Cost, Ending, Event, PositionError};
 use crate::error::{Error, Result};
 use crate::friction::Law;
-use crate::mechanism::{DRIVES, Form, Kind, Layout, Mechanism, Mode, State, Transition};
+use crate::mechanism::{DRIVES, Form, Layout, Mechanism, Mode, MotionKind, State, Transition};
 use crate::signal::DEGREE;
 pub use dynamics::{Dynamics, Quantity};
 use field::Field;
 use linear::Set;
 use model::{MOST, MOST_GUARDS, Model, Vector};
-pub(super) use run::Run;
+pub(super) use run::GeneralRun;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
-use step::Room;
+use step::StepBuffers;
 use stretch::Stretch;
 
 /// Most steps of a run, by what is known beforehand of its fastest rate.
@@ -103,7 +103,7 @@ pub(super) struct Core {
     known: Vec<Known>,
     /// The number of the present mode among them.
     present: usize,
-    room: Option<Box<Room>>,
+    room: Option<Box<StepBuffers>>,
     stretch: Stretch,
     /// Present time from the beginning of the stretch, s.
     tau: f64,
@@ -140,7 +140,7 @@ impl Noise {
 }
 
 /// The valid part of a step: to its end, or to its first event.
-struct Way<'a> {
+struct StepAdvance<'a> {
     stretch: &'a Stretch,
     /// Beginning and end, and the end without an event.
     from: f64,
@@ -155,7 +155,7 @@ struct Way<'a> {
 /// Observer of each step.
 trait Witness {
     /// Sees a step.
-    fn see(&mut self, core: &mut Core, way: &Way);
+    fn see(&mut self, core: &mut Core, way: &StepAdvance);
 
     /// True to continue.
     fn ask(&mut self) -> bool;
@@ -165,7 +165,7 @@ trait Witness {
 struct Nobody;
 
 impl Witness for Nobody {
-    fn see(&mut self, _: &mut Core, _: &Way) {}
+    fn see(&mut self, _: &mut Core, _: &StepAdvance) {}
 
     fn ask(&mut self) -> bool {
         true
@@ -198,13 +198,13 @@ impl Core {
         let mechanism = &*model.mechanism;
         let y = model.vector(&inner);
         // An angle of 1 rad is as much as r at the belt.
-        let turning = mechanism.bodies.iter().filter(|body| matches!(body.kind, Kind::Rotary { .. }));
+        let turning = mechanism.bodies.iter().filter(|body| matches!(body.kind, MotionKind::Rotary { .. }));
         let r = turning.map(|body| body.kind.lever()).fold(f64::INFINITY, f64::min);
         let r = if r.is_finite() { r } else { 1.0 };
         let mut absolute = [tolerance; MOST];
         for (body, part) in mechanism.bodies.iter().enumerate().filter(|(_, part)| !part.is_rotor) {
             absolute[model.coordinate(body)] *= r;
-            if part.kind == Kind::Linear {
+            if part.kind == MotionKind::Linear {
                 absolute[model.speed(body)] *= r;
             }
             let friction = &part.friction;

@@ -2,7 +2,7 @@
 
 use super::rows::Rows;
 use super::stretch::Stretch;
-use super::{Core, Way, Witness};
+use super::{Core, StepAdvance, Witness};
 use crate::mechanism::{Layout, Mechanism, State};
 use crate::solve::engine::Engine;
 use crate::solve::inputs::Pieces;
@@ -12,12 +12,12 @@ use crate::solve::running::{Running, Start};
 use crate::solve::{Detail, Ending, Flow, Grid, Outcome};
 
 /// A run in progress.
-pub(in crate::solve) struct Run<'a> {
+pub(in crate::solve) struct GeneralRun<'a> {
     core: Core,
     rows: Rows<'a>,
 }
 
-impl<'a> Run<'a> {
+impl<'a> GeneralRun<'a> {
     /// A run that begins in `start`; `fastest` is the machine's fastest rate, 1/s.
     pub(in crate::solve) fn new(
         mechanism: &Mechanism,
@@ -43,7 +43,7 @@ impl<'a> Run<'a> {
     }
 }
 
-impl Running for Run<'_> {
+impl Running for GeneralRun<'_> {
     fn set_input(&mut self, pieces: &Pieces) {
         self.core.take_up(Stretch::of(*pieces, self.rows.grid.end()));
     }
@@ -95,7 +95,7 @@ impl Running for Run<'_> {
 }
 
 impl Witness for Rows<'_> {
-    fn see(&mut self, core: &mut Core, way: &Way) {
+    fn see(&mut self, core: &mut Core, way: &StepAdvance) {
         self.show(core, way);
         // A row on an edge or an event shows what comes after it.
         let stretch = way.stretch;

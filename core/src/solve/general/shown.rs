@@ -3,7 +3,7 @@
 use super::model::{Model, Vector};
 use super::radau::inverse;
 use super::rows::{Rows, Shown};
-use super::{Core, Way};
+use super::{Core, StepAdvance};
 use crate::mechanism::{DRIVES, Mode, Shown as Quantity};
 use crate::solve::engine::Engine;
 use crate::solve::observe::{Curve, FEW, Gap, QUANTITIES, Reading, Readout, TERMS};
@@ -36,7 +36,7 @@ fn through(values: &[f64; PLACES]) -> [f64; PLACES] {
 
 impl Rows<'_> {
     /// Shows a step.
-    pub(super) fn show(&mut self, core: &Core, way: &Way) {
+    pub(super) fn show(&mut self, core: &Core, way: &StepAdvance) {
         if self.recorder.observer.is_none() {
             return;
         }

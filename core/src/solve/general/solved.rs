@@ -5,9 +5,9 @@ use super::linear::{EIGHTHS, Full, STATES, Set, States};
 use super::model::Vector;
 use super::radau::{POINTS, TERMS, monomials};
 use super::sources::Source;
-use super::step::{Begin, Room, Step, at_nodes, states};
+use super::step::{Begin, Step, StepBuffers, at_nodes, states};
 
-impl Room {
+impl StepBuffers {
     /// The numbers that a step depends on, by their columns; how many they are without forces.
     #[inline(always)]
     pub(super) fn fill(&mut self, field: &Field, begin: &Begin) -> usize {

@@ -474,7 +474,7 @@ mod tests {
     use super::super::bristles::Bristle;
     use super::*;
     use crate::friction::{Friction, Shape};
-    use crate::mechanism::{BODIES, Body, Follows, Kind, Label, Layout, Mechanism, Spring, SpringLaw};
+    use crate::mechanism::{BODIES, Body, Follows, Label, Layout, Mechanism, MotionKind, Spring, SpringLaw};
     use crate::polyline::Polyline;
     use std::sync::Arc;
 
@@ -487,7 +487,7 @@ mod tests {
         );
         let body = |index: usize, friction: Friction, along: Option<Polyline>| Body {
             label,
-            kind: Kind::Linear,
+            kind: MotionKind::Linear,
             inertia: 1.0,
             friction,
             force: 0.0,

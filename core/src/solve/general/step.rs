@@ -79,7 +79,7 @@ pub(super) struct Step<'a> {
 
 /// Room for what a step is solved by, and the step that was solved last.
 #[derive(Clone)]
-pub(super) struct Room {
+pub(super) struct StepBuffers {
     pub(super) forces: Forces,
     pub(super) arguments: Lanes<Lane>,
     /// The arguments without the forces at the nodes.
@@ -121,7 +121,7 @@ impl Guess {
     }
 }
 
-impl Room {
+impl StepBuffers {
     pub(super) fn new() -> Self {
         Self {
             forces: [[0.0; POINTS]; SOURCES],

@@ -7,9 +7,9 @@ use super::linear::{EIGHTHS, Set};
 use super::model::Vector;
 use super::radau::{POINTS, REACH, TERMS};
 use super::sources::SOURCES;
-use super::step::{ARGUMENTS, Begin, Guess, Lanes, Room, Step};
+use super::step::{ARGUMENTS, Begin, Guess, Lanes, Step, StepBuffers};
 use super::stretch::Stretch;
-use super::{Core, Hit, STEPS_BETWEEN_QUESTIONS, Way, Witness};
+use super::{Core, Hit, STEPS_BETWEEN_QUESTIONS, StepAdvance, Witness};
 use crate::mechanism::{Cause, Transition};
 use crate::solve::{Ending, rules};
 use std::cell::RefCell;
@@ -93,7 +93,7 @@ impl Core {
     /// Advances to the end of the stretch, or to the first guard that falls.
     fn integrate(&mut self, witness: &mut dyn Witness) -> Option<Hit> {
         let (field, stretch) = (self.field(), self.stretch);
-        let mut room = self.room.take().unwrap_or_else(|| Box::new(Room::new()));
+        let mut room = self.room.take().unwrap_or_else(|| Box::new(StepBuffers::new()));
         let evaluations = room.evaluations;
         // The forces begin anew with each mode.
         let mut guess = Guess::Constant;
@@ -136,7 +136,7 @@ impl Core {
         let (begin, from, until) = (self.y, self.tau, stretch.length());
         self.cost.steps += 1;
         self.rules.since_change += until - from;
-        let way = Way { stretch, from, until, to: until, begin: &begin, rests: true, dense: &|_| begin };
+        let way = StepAdvance { stretch, from, until, to: until, begin: &begin, rests: true, dense: &|_| begin };
         witness.see(self, &way);
         self.tau = until;
     }
@@ -146,7 +146,7 @@ impl Core {
         &mut self,
         field: &Field,
         stretch: &Stretch,
-        room: &mut Room,
+        room: &mut StepBuffers,
         guess: &mut Guess,
         witness: &mut dyn Witness,
     ) -> Option<Hit> {
@@ -291,7 +291,7 @@ impl Core {
     /// allowed, and nothing was taken; the smallest step is taken all the same.
     fn take(
         &mut self,
-        room: &mut Room,
+        room: &mut StepBuffers,
         (stretch, step): (&Stretch, &Step),
         (from, to): (f64, f64),
         (end, least): (Vector, bool),
@@ -329,7 +329,7 @@ impl Core {
                 let share = (tau - from) / dense.h;
                 dense.at(room, share)
             };
-            witness.see(self, &Way { stretch, from, until, to, begin: start.y, rests, dense: &at });
+            witness.see(self, &StepAdvance { stretch, from, until, to, begin: start.y, rests, dense: &at });
         }
         let asks = self.cost.steps.is_multiple_of(STEPS_BETWEEN_QUESTIONS);
         if (asks || self.rules.trouble.is_some()) && !witness.ask() && self.rules.trouble.is_none() {
@@ -352,7 +352,7 @@ impl Core {
     }
 
     /// The first guard to fall in a step.
-    fn first_fall(&mut self, room: &mut Room, dense: &mut Dense) -> Option<Fall> {
+    fn first_fall(&mut self, room: &mut StepBuffers, dense: &mut Dense) -> Option<Fall> {
         let (field, start) = (dense.field, dense.start);
         let mut first: Option<Fall> = None;
         let mut coefficients = [0.0; TERMS];
@@ -366,7 +366,7 @@ impl Core {
                 true => room.told[index].map(|value| value + shift),
                 false => {
                     dense.guard(room, index, shift, &mut coefficients);
-                    Room::at_points(&coefficients, room.series.order)
+                    StepBuffers::at_points(&coefficients, room.series.order)
                 }
             };
             if let Cause::GearTorque(drive) = cause {
@@ -400,7 +400,7 @@ impl Core {
     /// The state at a fall: the step is taken again up to there, until it ends at the fall. The nodes of the whole step
     /// can miss what a force does near the event, such as the peak of a narrow Stribeck curve where the speed is zero;
     /// those of the shorter one do not, so that its own error counts.
-    fn up_to(&self, room: &mut Room, dense: &mut Dense, (from, to): (f64, f64), fall: &Fall) -> Part {
+    fn up_to(&self, room: &mut StepBuffers, dense: &mut Dense, (from, to): (f64, f64), fall: &Fall) -> Part {
         let (field, stretch, fallen) = (dense.field, self.stretch, dense.field.watches[fall.index]);
         let cause = fallen.cause;
         let (begin, length) = (dense.start.y, to - from);
@@ -448,7 +448,7 @@ impl Core {
     /// which the condition holds and one at which it does not.
     fn locate(
         &self,
-        room: &mut Room,
+        room: &mut StepBuffers,
         dense: &mut Dense,
         (from, length): (f64, f64),
         check: &Check,
@@ -525,7 +525,7 @@ struct Dense<'a> {
 impl Dense<'_> {
     /// Solves it again from the same beginning over `h` alone, and its series with the inputs of that length. Returns
     /// its error as a multiple of the allowed one; infinity, and nothing has changed, if there is no solution.
-    fn shorten(&mut self, room: &mut Room, stretch: &Stretch, number: u64, (from, h): (f64, f64)) -> f64 {
+    fn shorten(&mut self, room: &mut StepBuffers, stretch: &Stretch, number: u64, (from, h): (f64, f64)) -> f64 {
         let field = self.field;
         let before = room.clone();
         let set = Set::new(&field.linear, h, stretch.degree);
@@ -540,7 +540,7 @@ impl Dense<'_> {
         error
     }
 
-    fn expand(&mut self, room: &mut Room) {
+    fn expand(&mut self, room: &mut StepBuffers) {
         if !self.is_expanded {
             room.expand(self.field, self.h, &self.start);
             self.is_expanded = true;
@@ -548,7 +548,7 @@ impl Dense<'_> {
     }
 
     /// The state at the share `s`.
-    fn at(&mut self, room: &mut Room, s: f64) -> Vector {
+    fn at(&mut self, room: &mut StepBuffers, s: f64) -> Vector {
         let eighths = s * EIGHTHS as f64;
         let is_eighth = (eighths - eighths.round()).abs() < 1e-9 && (0.5..EIGHTHS as f64 - 0.5).contains(&eighths);
         if self.whole && self.h == self.set.h && is_eighth {
@@ -560,7 +560,7 @@ impl Dense<'_> {
     }
 
     /// A guard along the step, by powers of its share.
-    fn guard(&mut self, room: &mut Room, index: usize, shift: f64, coefficients: &mut [f64; TERMS]) {
+    fn guard(&mut self, room: &mut StepBuffers, index: usize, shift: f64, coefficients: &mut [f64; TERMS]) {
         self.expand(room);
         room.guard_along(self.field, &self.start, index, coefficients);
         coefficients[0] += shift;

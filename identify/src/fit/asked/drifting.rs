@@ -1,7 +1,7 @@
 //! A run of a machine that changes along it: part by part, each with a machine of its own, from where the one before
 //! ended.
 
-use super::run::Run;
+use super::run::FittedLog;
 use crate::case::Experiment;
 use crate::log::Quantity;
 use crate::machine::Machine;
@@ -16,7 +16,7 @@ const STATE: [&str; 6] = ["drive_angle", "drive_speed", "cart_position", "cart_s
 
 /// Weighted residuals, model minus log, of machines that follow each other in equal parts of the log; false where the
 /// log is not one of an open loop at even times, or a machine does not get through its part.
-pub(crate) fn residuals(run: &Run, stages: &[Machine], extras: &[f64], out: &mut [f64]) -> bool {
+pub(crate) fn residuals(run: &FittedLog, stages: &[Machine], extras: &[f64], out: &mut [f64]) -> bool {
     let is_known = |seen: &Quantity| !seen.is_of_rotor() && !seen.is_acceleration();
     let quantities: Vec<Quantity> = run.seen.iter().map(|seen| seen.quantity).collect();
     if !run.is_even() || run.is_closed() || !quantities.iter().all(is_known) {

@@ -2,7 +2,7 @@
 
 use super::reading::Reading;
 use super::residuals::{Bounds, Differences, Residuals, Step};
-use super::run::{Extra, MeasuredOutput, Nuisance, Run, Setting, rounding_at_rest};
+use super::run::{Extra, FittedLog, LogOptions, MeasuredOutput, Nuisance, rounding_at_rest};
 use super::straight::straightened;
 use crate::case::{Case, Nuisances, Plan, Scope, matches, parameters};
 use crate::error::{Error, Result};
@@ -28,9 +28,9 @@ pub struct Problem<'a> {
     /// Nuisances that all logs share.
     pub shared: Vec<Extra>,
     /// The logs that are fitted.
-    pub runs: Vec<Run>,
+    pub runs: Vec<FittedLog>,
     /// Logs that are compared, not fitted.
-    pub held_out: Vec<Run>,
+    pub held_out: Vec<FittedLog>,
     /// Simulated runs so far.
     pub simulations: u64,
     /// Runs that the last Jacobian took differences of.
@@ -102,9 +102,9 @@ impl<'a> Problem<'a> {
         for experiment in &case.experiments {
             let Some(log) = &experiment.log else { continue };
             let held = plan.held_out.iter().any(|pattern| matches(&experiment.name, pattern));
-            let setting = Setting { window: plan.windows, fitted_until: plan.until, held_out: held };
+            let setting = LogOptions { window: plan.windows, fitted_until: plan.until, held_out: held };
             let part = plan.part(&experiment.name);
-            for mut run in Run::all(experiment, log, &setting) {
+            for mut run in FittedLog::all(experiment, log, &setting) {
                 run.part = parts.iter().position(|name| name == part).unwrap_or(0);
                 if plan.closed_loop {
                     run.close(case, log);
@@ -137,7 +137,7 @@ impl<'a> Problem<'a> {
     }
 
     /// A single run of a machine that is known.
-    pub(crate) fn alone(machine: Machine, mut run: Run) -> Self {
+    pub(crate) fn alone(machine: Machine, mut run: FittedLog) -> Self {
         run.part = 0;
         Self {
             machine,
@@ -181,7 +181,7 @@ impl<'a> Problem<'a> {
         let &Nuisances { delay, input_gain, input_offset, initial_state, bias, sensor_play } = &plan.nuisance;
         let interval = self.runs[0].interval();
         // Samples that are taken after their stamps appear as an early input, if the input is logged.
-        let mut inputs = self.runs.iter().flat_map(Run::inputs);
+        let mut inputs = self.runs.iter().flat_map(FittedLog::inputs);
         let is_sampled = inputs.all(|input| matches!(input, Signal::Sampled { .. }));
         let (early, high) = (if is_sampled { -50.0 * interval } else { 0.0 }, 50.0 * interval);
         let late = Extra { what: Nuisance::Delay, start: 0.0, unit: interval, low: early, high, known: None };
@@ -495,7 +495,7 @@ impl<'a> Problem<'a> {
         self.globals() + self.runs[..index].iter().map(|run| variable_extras(run).count()).sum::<usize>()
     }
 
-    /// The values of a run's extras, and of the shared ones, for [`Run::experiment`].
+    /// The values of a run's extras, and of the shared ones, for [`FittedLog::experiment`].
     pub fn extras_of(&self, index: usize, x: &[f64]) -> Vec<f64> {
         let mut at = self.place(index);
         let own = self.runs[index].extras.iter().map(|extra| {
@@ -538,7 +538,7 @@ impl<'a> Problem<'a> {
 
     /// Index of the first residual of run `index`.
     pub fn first_row(&self, index: usize) -> usize {
-        self.runs[..index].iter().map(Run::rows).sum()
+        self.runs[..index].iter().map(FittedLog::rows).sum()
     }
 
     /// Residuals of all runs.
@@ -717,7 +717,7 @@ fn separated(case: &Case, plan: &Plan, all: Vec<Free>) -> Result<Separated> {
 }
 
 /// Extras that have room to vary and belong to the run alone.
-pub(crate) fn variable_extras(run: &Run) -> impl Iterator<Item = &Extra> {
+pub(crate) fn variable_extras(run: &FittedLog) -> impl Iterator<Item = &Extra> {
     run.extras.iter().filter(|extra| extra.low < extra.high)
 }
 
@@ -730,7 +730,7 @@ pub(crate) fn extent(values: &[f64]) -> f64 {
 
 /// The share of the play of a sensor that lies ahead where a run begins: none if it begins in forward motion, all of it
 /// in backward motion.
-fn ahead(run: &Run, quantity: Quantity, noise: &Noise, initial_state: bool) -> f64 {
+fn ahead(run: &FittedLog, quantity: Quantity, noise: &Noise, initial_state: bool) -> f64 {
     let (slope, doubt) = Reading::of_output(run, quantity).speed_at_start(run, |own| Some(noise.of(own)));
     match initial_state || run.window > 0 {
         true if slope > STARTS_MOVING * doubt => 0.0,
@@ -750,7 +750,7 @@ struct Start<'r> {
 impl Start<'_> {
     /// Extras for position and speed at the start of a run: both with `initial_state`; `given` is true if the case
     /// states the start.
-    fn extras(&self, run: &Run, machine: &Machine, (initial_state, given): (bool, bool)) -> Vec<Extra> {
+    fn extras(&self, run: &FittedLog, machine: &Machine, (initial_state, given): (bool, bool)) -> Vec<Extra> {
         let mut extras = Vec::new();
         let r = machine.pulley_radius;
         let values = self.reading.map(|reading| reading.values(run));
@@ -799,7 +799,7 @@ impl Start<'_> {
 }
 
 /// The scale on which a parameter is searched for.
-fn scale(machine: &Machine, parameter: &Free, runs: &[Run]) -> Scale {
+fn scale(machine: &Machine, parameter: &Free, runs: &[FittedLog]) -> Scale {
     if parameter.logarithmic() && parameter.start > 0.0 {
         Scale::Log(parameter.start)
     } else if parameter.start != 0.0 {
@@ -811,7 +811,7 @@ fn scale(machine: &Machine, parameter: &Free, runs: &[Run]) -> Scale {
 
 /// A typical value of a quantity that may be zero: for friction a tenth of the motor's force at the greatest input.
 /// `None` if it depends on the machine alone, such as the gain of an amplifier, whose unit depends on the input.
-fn typical(machine: &Machine, parameter: &Free, runs: &[Run]) -> Option<f64> {
+fn typical(machine: &Machine, parameter: &Free, runs: &[FittedLog]) -> Option<f64> {
     let most = runs.iter().flat_map(|run| run.logged.iter().flatten()).fold(0.0, |most: f64, u| most.max(u.abs()));
     let torque_of = |unit: &DriveUnit| {
         let (motor, amplifier) = (&unit.motor, &unit.amplifier);
@@ -848,7 +848,7 @@ fn typical(machine: &Machine, parameter: &Free, runs: &[Run]) -> Option<f64> {
 
 impl Residuals for Problem<'_> {
     fn rows(&self) -> usize {
-        self.runs.iter().map(Run::rows).sum()
+        self.runs.iter().map(FittedLog::rows).sum()
     }
 
     fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {

@@ -1,6 +1,6 @@
 //! The coordinates of a machine as the outputs of a log show them: where its slides are, without strain of the belt.
 
-use super::run::Run;
+use super::run::FittedLog;
 use crate::log::Quantity;
 use crate::machine::Machine;
 
@@ -14,7 +14,7 @@ pub(crate) struct Reading {
 impl Reading {
     /// The position of a slide by the first output that shows it alone, or else by the angles of all drives; `None` if
     /// the log has neither.
-    pub fn of(run: &Run, machine: &Machine, slide: usize) -> Option<Self> {
+    pub fn of(run: &FittedLog, machine: &Machine, slide: usize) -> Option<Self> {
         let (geometry, r) = (machine.geometry(), machine.pulley_radius);
         let arm = |quantity: Quantity| if quantity.is_linear() { 1.0 } else { r };
         let shows_alone = |quantity: Quantity| {
@@ -42,7 +42,7 @@ impl Reading {
     }
 
     /// The output of this quantity by itself, in its unit.
-    pub fn of_output(run: &Run, quantity: Quantity) -> Self {
+    pub fn of_output(run: &FittedLog, quantity: Quantity) -> Self {
         let output = run.seen.iter().position(|seen| seen.quantity == quantity);
         Self { parts: output.map(|output| (output, 1.0)).into_iter().collect() }
     }
@@ -53,26 +53,26 @@ impl Reading {
     }
 
     /// The position in each row of a run, NaN where an output is missing.
-    pub fn values(&self, run: &Run) -> Vec<f64> {
+    pub fn values(&self, run: &FittedLog) -> Vec<f64> {
         let row = |k: usize| self.parts.iter().map(|(output, weight)| run.seen[*output].values[k] * weight).sum();
         (0..run.time.len()).map(row).collect()
     }
 
     /// Its standard deviation, from those of the outputs; `None` if one of them is unknown.
-    pub fn deviation(&self, run: &Run, of: impl Fn(Quantity) -> Option<f64>) -> Option<f64> {
+    pub fn deviation(&self, run: &FittedLog, of: impl Fn(Quantity) -> Option<f64>) -> Option<f64> {
         let parts = self.parts.iter().map(|(output, weight)| Some(weight.abs() * of(run.seen[*output].quantity)?));
         let parts: Option<Vec<f64>> = parts.collect();
         parts.map(|parts| parts.into_iter().fold(0.0, f64::hypot))
     }
 
     /// Greatest minus least position, m; of several outputs at most that.
-    pub fn extent(&self, run: &Run, of: impl Fn(&[f64]) -> f64) -> f64 {
+    pub fn extent(&self, run: &FittedLog, of: impl Fn(&[f64]) -> f64) -> f64 {
         self.parts.iter().map(|(output, weight)| weight.abs() * of(&run.seen[*output].values)).sum()
     }
 
     /// The speed at the start of a log or window, m/s, from a line through its first rows, and its standard error for
     /// these deviations of the outputs.
-    pub fn speed_at_start(&self, run: &Run, of: impl Fn(Quantity) -> Option<f64>) -> (f64, f64) {
+    pub fn speed_at_start(&self, run: &FittedLog, of: impl Fn(Quantity) -> Option<f64>) -> (f64, f64) {
         let is_there = |k: &usize| self.parts.iter().all(|(output, _)| run.seen[*output].values[*k].is_finite());
         let rows: Vec<usize> = (0..run.time.len().min(15)).filter(is_there).collect();
         let n = rows.len().max(1) as f64;

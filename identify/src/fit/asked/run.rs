@@ -126,7 +126,7 @@ impl MeasuredOutput {
 
 /// A log, or a window of one, and the model's side of it.
 #[derive(Debug, Clone)]
-pub struct Run {
+pub struct FittedLog {
     /// The experiment's name.
     pub name: String,
     /// Which window of it, from 0; 0 where it is whole.
@@ -168,7 +168,7 @@ struct Closed {
 
 /// Options for the conversion of a log to a run.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Setting {
+pub struct LogOptions {
     /// Length of a window, s; the whole log without.
     pub window: Option<f64>,
     /// After this time nothing is fitted.
@@ -177,14 +177,14 @@ pub struct Setting {
     pub held_out: bool,
 }
 
-impl Run {
+impl FittedLog {
     /// Time of its last row, s.
     pub fn length(&self) -> f64 {
         self.time.last().copied().unwrap_or(0.0)
     }
 
     /// The runs of an experiment's log: one, or one for each window.
-    pub fn all(experiment: &Experiment, log: &Log, setting: &Setting) -> Vec<Self> {
+    pub fn all(experiment: &Experiment, log: &Log, setting: &LogOptions) -> Vec<Self> {
         let end = log.time.last().copied().unwrap_or(0.0);
         let Some(window) = setting.window.filter(|window| *window < end) else {
             return vec![Self::of(experiment, log, 0..log.time.len(), 0, setting)];
@@ -204,7 +204,13 @@ impl Run {
         runs
     }
 
-    fn of(experiment: &Experiment, log: &Log, rows: std::ops::Range<usize>, window: usize, setting: &Setting) -> Self {
+    fn of(
+        experiment: &Experiment,
+        log: &Log,
+        rows: std::ops::Range<usize>,
+        window: usize,
+        setting: &LogOptions,
+    ) -> Self {
         let whole = rows.len() == log.time.len();
         let shift = if whole { 0.0 } else { log.time[rows.start] };
         let time: Vec<f64> = log.time[rows.clone()].iter().map(|t| t - shift).collect();
@@ -683,7 +689,7 @@ mod tests {
         };
         experiment.inputs[0] =
             Signal::Sampled { times: log.time.clone(), values: log.inputs[0].clone(), hold: log.hold };
-        let predicted = |run: &mut Run, known: &[(Nuisance, f64)]| {
+        let predicted = |run: &mut FittedLog, known: &[(Nuisance, f64)]| {
             let extra = |what| Extra { what, start: 0.0, unit: 1.0, low: -1.0, high: 1.0, known: None };
             run.extras = known.iter().map(|(what, _)| extra(*what)).collect();
             let values: Vec<f64> = known.iter().map(|(_, value)| *value).collect();
@@ -692,11 +698,11 @@ mod tests {
             columns
         };
         let late = (Nuisance::Delay, 12e-3);
-        let whole = predicted(&mut Run::all(&experiment, &log, &Setting::default())[0], &[late]);
+        let whole = predicted(&mut FittedLog::all(&experiment, &log, &LogOptions::default())[0], &[late]);
         // Windows of 40 rows: seams in every phase of the pulses, and more delay than some inputs last in a window.
-        let setting = Setting { window: Some(0.04), ..Setting::default() };
+        let setting = LogOptions { window: Some(0.04), ..LogOptions::default() };
         let mut first = 0;
-        for mut run in Run::all(&experiment, &log, &setting) {
+        for mut run in FittedLog::all(&experiment, &log, &setting) {
             let begin = [(Nuisance::StartPosition(0), whole[0][first]), (Nuisance::StartSpeed(0), whole[1][first])];
             let own = predicted(&mut run, &[late, begin[0], begin[1]]);
             for (own, whole) in own.iter().zip(&whole) {

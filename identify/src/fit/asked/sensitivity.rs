@@ -2,7 +2,7 @@
 
 use super::problem::Problem;
 use super::residuals::{Bounds, Differences, Step};
-use super::run::{Extra, Nuisance, Run, between, heading_of, per_position};
+use super::run::{Extra, FittedLog, Nuisance, between, heading_of, per_position};
 use crate::fit::limits::{EQUATION_STEP, START_STEP};
 use crate::log::Quantity;
 use crate::machine::Machine;
@@ -165,7 +165,7 @@ impl Problem<'_> {
 /// An output and its derivatives by the variables.
 type Sloped = (Vec<f64>, Vec<Vec<f64>>);
 
-impl Run {
+impl FittedLog {
     /// True if its start only shifts its outputs.
     fn is_shifted(&self, machine: &Machine) -> bool {
         let mut starts = self.extras.iter().filter(|extra| matches!(extra.what, Nuisance::StartPosition(_)));

@@ -7,7 +7,7 @@
 //! z₀ = y₀        z_k = max(y_k − c w, min(y_k + (1 − c) w, z_{k−1}))
 //! ```
 
-use super::run::{Nuisance, Run};
+use super::run::{FittedLog, Nuisance};
 
 /// Play of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,7 +80,7 @@ impl SensorPlay {
     }
 }
 
-impl Run {
+impl FittedLog {
     /// The play of the sensor of output `index` for these values of the extras; `None` if it has none.
     pub(crate) fn sensor_play(&self, index: usize, extras: &[f64]) -> Option<SensorPlay> {
         let quantity = self.seen[index].quantity;

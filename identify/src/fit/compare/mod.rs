@@ -28,14 +28,14 @@ use std::path::Path;
 
 /// The laws and windows to compare.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Setting {
+pub struct ComparisonOptions {
     /// Friction laws.
     pub laws: Vec<FrictionLaw>,
     /// Lengths of windows, s; `None` for whole logs.
     pub windows: Vec<Option<f64>>,
 }
 
-impl Setting {
+impl ComparisonOptions {
     /// The usual laws; whole logs, and windows of a fifth and of a twentieth of the longest.
     pub fn usual(case: &Case, plan: &Plan) -> Self {
         let ends = case.experiments.iter().filter_map(|experiment| experiment.log.as_ref()?.time.last().copied());
@@ -120,7 +120,7 @@ pub fn compare(
     case: &Case,
     name: &Path,
     plan: &Plan,
-    setting: &Setting,
+    setting: &ComparisonOptions,
     stop: Option<Stop>,
     watch: &mut dyn FnMut(&str) -> Flow,
 ) -> Result<Comparison> {

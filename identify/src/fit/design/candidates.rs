@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 
 /// A kind of input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Kind {
+pub enum Excitation {
     /// Trapezoids there and back, every second one smaller.
     Trapezoid,
     /// Sines in succession, whole periods of each.
@@ -19,9 +19,10 @@ pub enum Kind {
     Prbs,
 }
 
-impl Kind {
+impl Excitation {
     /// All kinds.
-    pub const ALL: [Kind; 5] = [Kind::Trapezoid, Kind::Sweep, Kind::Chirp, Kind::Multisine, Kind::Prbs];
+    pub const ALL: [Excitation; 5] =
+        [Excitation::Trapezoid, Excitation::Sweep, Excitation::Chirp, Excitation::Multisine, Excitation::Prbs];
 
     /// In a word.
     pub fn word(self) -> &'static str {
@@ -45,7 +46,7 @@ impl Kind {
 }
 
 /// Limits of a search.
-pub(super) struct Room {
+pub(super) struct SearchLimits {
     /// Greatest input, V or A.
     pub input: f64,
     /// Length, s.
@@ -144,8 +145,8 @@ fn between(share: f64, low: f64, high: f64) -> f64 {
 
 impl Shape {
     /// Candidate of a kind at a point of the unit cube.
-    pub(super) fn at(kind: Kind, share: &[f64], room: &Room) -> Self {
-        let &Room { input, duration, every, frequencies: [low, high] } = room;
+    pub(super) fn at(kind: Excitation, share: &[f64], room: &SearchLimits) -> Self {
+        let &SearchLimits { input, duration, every, frequencies: [low, high] } = room;
         // A whole number of intervals.
         let whole = |time: f64, least: f64| rounded(every * (time / every).round().max(least));
         let busy = whole(duration * (1.0 - REST_AT_END), 1.0);
@@ -153,7 +154,7 @@ impl Shape {
         let frequency = |share: f64| round(between(share, low, high));
         let apart = |a: f64, b: f64| if a < b { (a, b) } else { (b, round(a.max(b * 1.05))) };
         match kind {
-            Kind::Trapezoid => {
+            Excitation::Trapezoid => {
                 let cycles = between(share[1], 1.0, MOST_CYCLES).round();
                 let half = busy / (2.0 * cycles);
                 let (ramp, rest) = (0.45 * between(share[2], 0.002, 1.0), 0.6 * share[3]);
@@ -162,19 +163,21 @@ impl Shape {
                 let ratio = round(0.2 + 0.8 * share[4]);
                 Self::Trapezoid { amplitude, ramp, hold, rest, ratio, cycles: cycles as usize }
             }
-            Kind::Sweep => {
+            Excitation::Sweep => {
                 let sines = between(share[3], 1.0, SWEEP_SINES).round();
                 let (from, to) = (frequency(share[1]), frequency(share[2]));
                 let each = round(busy / sines);
                 Self::Sweep { amplitude, from, to, sines: sines as usize, tilt: round(share[4]), each }
             }
-            Kind::Chirp => Self::Chirp { amplitude, from: frequency(share[1]), to: frequency(share[2]), over: busy },
-            Kind::Multisine => {
+            Excitation::Chirp => {
+                Self::Chirp { amplitude, from: frequency(share[1]), to: frequency(share[2]), over: busy }
+            }
+            Excitation::Multisine => {
                 let (from, to) = apart(frequency(share[1]), frequency(share[2]));
                 let tones = between(share[3], 2.0, MULTISINE_TONES).round() as usize;
                 Self::Multisine { amplitude, from, to, tones, lasts: busy }
             }
-            Kind::Prbs => {
+            Excitation::Prbs => {
                 let least = (0.5 / high).max(duration / MOST_BITS);
                 let bit = whole(between(share[1], least, 0.25 * duration), 1.0);
                 let seed = 1 + (share[2] * 9.0).floor() as u64;
@@ -184,13 +187,13 @@ impl Shape {
     }
 
     /// Its kind.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> Excitation {
         match self {
-            Self::Trapezoid { .. } => Kind::Trapezoid,
-            Self::Sweep { .. } => Kind::Sweep,
-            Self::Chirp { .. } => Kind::Chirp,
-            Self::Multisine { .. } => Kind::Multisine,
-            Self::Prbs { .. } => Kind::Prbs,
+            Self::Trapezoid { .. } => Excitation::Trapezoid,
+            Self::Sweep { .. } => Excitation::Sweep,
+            Self::Chirp { .. } => Excitation::Chirp,
+            Self::Multisine { .. } => Excitation::Multisine,
+            Self::Prbs { .. } => Excitation::Prbs,
         }
     }
 

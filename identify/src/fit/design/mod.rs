@@ -20,7 +20,7 @@ mod trial;
 mod verify;
 
 pub use crate::fit::limits::VERIFIED;
-pub use candidates::{Kind, Shape};
+pub use candidates::{Excitation, Shape};
 pub use driven::Driven;
 pub use limits::{Limits, Origin, Reached};
 pub use search::{Alternative, Designed, Own, Promise};
@@ -60,7 +60,7 @@ pub struct Request {
     /// The parameters of the criterion; if empty, the free ones of `[fit]`.
     pub names: Vec<String>,
     /// The kinds of inputs to choose from; all if empty.
-    pub kinds: Vec<Kind>,
+    pub kinds: Vec<Excitation>,
     /// The driven motors to choose from, by the names of [`Driven::all`]; all if empty.
     pub driven: Vec<String>,
     /// The measure that is minimised.
@@ -156,10 +156,10 @@ pub(super) struct Task<'a> {
 ///
 /// ```
 /// use taut::case::{Case, TEMPLATE};
-/// use taut::fit::experiment_design::{Kind, Request, design};
+/// use taut::fit::experiment_design::{Excitation, Request, design};
 /// let case = Case::from_text("axis.toml", TEMPLATE)?;
 /// let names = ["cart.mass", "cart.friction.coulomb"].map(String::from).to_vec();
-/// let request = Request { names, kinds: vec![Kind::Trapezoid], duration: 1.0, ..Request::default() };
+/// let request = Request { names, kinds: vec![Excitation::Trapezoid], duration: 1.0, ..Request::default() };
 /// let found = design(&case, &request, &|| false, &mut |_| {})?;
 /// assert!(found.promises.iter().all(|promise| promise.relative < 0.05));
 /// assert!(found.case_text(&case, "axis.toml".as_ref())?.contains("designed"));

@@ -1,6 +1,6 @@
 //! The search: points spread over the variables of each kind of input, then an evolution strategy from the best ones.
 
-use super::candidates::{Kind, Room, Shape};
+use super::candidates::{Excitation, SearchLimits, Shape};
 use super::criterion::Information;
 use super::driven::Driven;
 use super::limits::{Limits, Reached};
@@ -128,8 +128,8 @@ struct Judged {
 }
 
 /// The best input of these kinds, or of all if the list is empty.
-pub(super) fn best(task: &Task, case: &Case, kinds: &[Kind], watch: &mut dyn FnMut(&str)) -> Result<Designed> {
-    let kinds = if kinds.is_empty() { &Kind::ALL[..] } else { kinds };
+pub(super) fn best(task: &Task, case: &Case, kinds: &[Excitation], watch: &mut dyn FnMut(&str)) -> Result<Designed> {
+    let kinds = if kinds.is_empty() { &Excitation::ALL[..] } else { kinds };
     let mut tried = 0;
     let mut found: Vec<(Alternative, Vec<f64>)> = Vec::new();
     for &kind in kinds {
@@ -190,14 +190,14 @@ fn nothing(task: &Task) -> Error {
     )
 }
 
-fn room(task: &Task) -> Room {
+fn room(task: &Task) -> SearchLimits {
     let high = (OF_RATE / task.every).min(MOST_PERIODS / task.duration);
     let low = (1.0 / task.duration).min(0.5 * high);
-    Room { input: task.limits.input.0, duration: task.duration, every: task.every, frequencies: [low, high] }
+    SearchLimits { input: task.limits.input.0, duration: task.duration, every: task.every, frequencies: [low, high] }
 }
 
 /// Value of an input at a point of the unit cube.
-fn look(task: &Task, kind: Kind, driven: &Driven, point: &[f64], tried: &mut usize) -> Option<(Shape, f64)> {
+fn look(task: &Task, kind: Excitation, driven: &Driven, point: &[f64], tried: &mut usize) -> Option<(Shape, f64)> {
     *tried += 1;
     let (shape, initial, _) = task.fitted(Shape::at(kind, point, &room(task)), driven, &[])?;
     let score = task.information(&driven.inputs(&shape), initial, &Differences::Forward)?.score(task.criterion);
@@ -205,7 +205,7 @@ fn look(task: &Task, kind: Kind, driven: &Driven, point: &[f64], tried: &mut usi
 }
 
 /// The best of points spread evenly along each variable, in random order (Latin hypercube).
-fn screened(task: &Task, kind: Kind, driven: &Driven, tried: &mut usize) -> Option<(Shape, Vec<f64>, f64)> {
+fn screened(task: &Task, kind: Excitation, driven: &Driven, tried: &mut usize) -> Option<(Shape, Vec<f64>, f64)> {
     let n = kind.numbers();
     let mut random = Pcg64::seed_from_u64(task.seed);
     let orders: Vec<Vec<usize>> = (0..n).map(|_| shuffled(FIRST_POINTS, &mut random)).collect();
@@ -235,7 +235,7 @@ fn shuffled(count: usize, random: &mut Pcg64) -> Vec<usize> {
 /// The best result of an evolution strategy from a point, if better.
 fn refined(
     task: &Task,
-    kind: Kind,
+    kind: Excitation,
     driven: &Driven,
     (from, score): (&[f64], f64),
     tried: &mut usize,

@@ -44,7 +44,7 @@ pub(super) struct Noise<'a> {
 }
 
 /// Result of the search.
-pub(super) struct Found {
+pub(super) struct Waves {
     /// True if the force changes along the travel.
     pub changes: bool,
     /// The periodic components, the largest first.
@@ -74,7 +74,7 @@ impl Noise<'_> {
 }
 
 /// Searches wave numbers up to `highest` (1/m) in the values of a map.
-pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Found {
+pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Waves {
     let (length, step) = (noise.length(), 1.0 / (MAP_RASTER * noise.length()));
     let raster: Vec<f64> = (MAP_RASTER as usize..).map(|k| k as f64 * step).take_while(|f| *f <= highest).collect();
     let tried = raster.len().max(1) as f64;
@@ -136,7 +136,7 @@ pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Found {
         let x = freedom * ((MAP_FALSE_ALARM / tried).powf(-freedom.recip()) - 1.0);
         (x * power * noise.weight).sqrt()
     };
-    Found { changes, waves, visible: raster.iter().map(needed).fold(0.0, f64::max) }
+    Waves { changes, waves, visible: raster.iter().map(needed).fold(0.0, f64::max) }
 }
 
 /// Refines each wave number to the least residual of all sines together, since a single sine is displaced by the

@@ -59,7 +59,7 @@ pub struct Wave {
 }
 
 /// Noise of a quantity at one point of the grid.
-struct Told {
+struct NoiseAtPoint {
     /// Logarithm of likelihood times prior weight.
     weight: f64,
     /// s², the variance of the white noise.
@@ -242,14 +242,14 @@ impl Estimate {
     /// Covariances of the globals by these kinds of noise, with these sizes along the series.
     fn parts(
         &self,
-        told: &[Told],
+        told: &[NoiseAtPoint],
         scales: Option<&[Vec<f64>]>,
         rest: &DMatrix<f64>,
         unsure: &DMatrix<f64>,
     ) -> Vec<DMatrix<f64>> {
         let white = self.white_part(scales) + rest;
         let mut known: Vec<([f64; 2], DMatrix<f64>)> = Vec::new();
-        let of = |one: &Told| {
+        let of = |one: &NoiseAtPoint| {
             let mut own = white.clone();
             for slow in &one.slow {
                 let kind = [slow.time, slow.frequency];
@@ -265,7 +265,7 @@ impl Estimate {
     }
 
     /// All tried kinds of noise, with their likelihoods.
-    fn told(&self) -> Vec<Told> {
+    fn told(&self) -> Vec<NoiseAtPoint> {
         let long = |series: &Series| series.time.last().unwrap_or(&0.0) - series.time.first().unwrap_or(&0.0);
         let longest = self.series.iter().map(long).fold(0.0, f64::max);
         let blocks = self.blocks();
@@ -304,7 +304,7 @@ impl Estimate {
             }
             told
         };
-        let counted = |mut told: Vec<Told>, before: f64| {
+        let counted = |mut told: Vec<NoiseAtPoint>, before: f64| {
             told.iter_mut().for_each(|one| one.weight += before.ln());
             told
         };
@@ -314,7 +314,7 @@ impl Estimate {
         all.extend(counted(one, (1.0 - WHITE_BEFOREHAND - TWO_BEFOREHAND) / (times.len() * powers.len()) as f64));
         let Some(mut first) = first else { return all };
         // Two: each beside the best of the other.
-        let mut turns: Vec<Vec<Told>> = Vec::new();
+        let mut turns: Vec<Vec<NoiseAtPoint>> = Vec::new();
         for _ in 0..NOISE_TURNS {
             let two = along(Some(first));
             let Some(top) = best(&two) else { return all };
@@ -325,7 +325,7 @@ impl Estimate {
         all.extend(self.swinging([interval, longest], gain));
         let (Some(a), Some(b)) = (turns.pop(), turns.pop()) else { return all };
         let top = best(&a).map_or(0.0, |one| one.weight);
-        let as_good = |told: &[Told]| told.iter().map(|one| (one.weight - top).exp()).sum::<f64>();
+        let as_good = |told: &[NoiseAtPoint]| told.iter().map(|one| (one.weight - top).exp()).sum::<f64>();
         let apart = |(i, j): (usize, usize)| (times[j] / times[i]).ln() > TIMES_APART;
         let pairs = (0..times.len()).flat_map(|j| (0..j).map(move |i| (i, j))).filter(|&pair| apart(pair)).count();
         let each = 0.5 * TWO_BEFOREHAND / (pairs * powers.len() * powers.len()).max(1) as f64;
@@ -341,7 +341,7 @@ impl Estimate {
     /// variance are improved alternately by steps that grow while they improve, and are halved where they do not: up to
     /// a pure tone. Its variance is that of its amplitude only where its own noise, σ² 2T/τ in a log of length T, is
     /// below the error with which the log determines it.
-    fn swinging(&self, [interval, longest]: [f64; 2], gain: f64) -> Vec<Told> {
+    fn swinging(&self, [interval, longest]: [f64; 2], gain: f64) -> Vec<NoiseAtPoint> {
         let of = |[frequency, time, variance]: [f64; 3]| {
             let [frequency, time, variance] = [frequency.exp(), time.exp(), variance.exp()];
             self.likelihood(&[Slow { variance, time, frequency }])
@@ -350,9 +350,10 @@ impl Estimate {
         let rows = self.series.iter().flat_map(|series| series.rows.chunks(series.wide()));
         let most_noise =
             SWING_MOST * rows.filter_map(|row| row.last()).map(|r| r * r).sum::<f64>() / self.blocks() as f64;
-        let is_possible = |told: &&Told| told.slow[0].variance * gain * told.white <= most_noise;
-        let weight =
-            |told: &Option<Told>| told.as_ref().filter(is_possible).map_or(f64::NEG_INFINITY, |told| told.weight);
+        let is_possible = |told: &&NoiseAtPoint| told.slow[0].variance * gain * told.white <= most_noise;
+        let weight = |told: &Option<NoiseAtPoint>| {
+            told.as_ref().filter(is_possible).map_or(f64::NEG_INFINITY, |told| told.weight)
+        };
         let mut best: Option<([f64; 3], f64)> = None;
         let (mut frequency, mut tried) = (SWINGS_IN_LOG * TAU / longest, 0);
         while frequency * interval < SWING_FASTEST {
@@ -403,7 +404,7 @@ impl Estimate {
     }
 
     /// The restricted likelihood of the residuals with these slow noises.
-    fn likelihood(&self, slow: &[Slow]) -> Option<Told> {
+    fn likelihood(&self, slow: &[Slow]) -> Option<NoiseAtPoint> {
         let Normal { mut sum, mut determinant, count, own } = self.normal(slow);
         let n = sum.ncols() - 1;
         let mut rank = 0;
@@ -426,7 +427,7 @@ impl Estimate {
         if freedom < 2.0 || squares <= 0.0 || !squares.is_finite() || !determinant.is_finite() {
             return None;
         }
-        Some(Told {
+        Some(NoiseAtPoint {
             weight: -0.5 * determinant - 0.5 * freedom * squares.ln(),
             white: squares / freedom,
             slow: slow.to_vec(),
@@ -474,7 +475,7 @@ impl Estimate {
     }
 
     /// The amplitudes of the waves in the rows under this noise, and their covariance.
-    fn amplitudes(&self, noise: &Told) -> Option<(DVector<f64>, DMatrix<f64>)> {
+    fn amplitudes(&self, noise: &NoiseAtPoint) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let sum = self.normal(&noise.slow).sum;
         let n = sum.ncols() - 1;
         let inverse = sum.view((0, 0), (n, n)).into_owned().try_inverse()?;
@@ -485,9 +486,9 @@ impl Estimate {
 
     /// Finds errors that repeat with position, and the noise beside them. At a steady speed such an error oscillates
     /// like noise: the likelier of both counts.
-    fn waves_beside(&mut self, told: &mut Vec<Told>) -> Option<Vec<f64>> {
+    fn waves_beside(&mut self, told: &mut Vec<NoiseAtPoint>) -> Option<Vec<f64>> {
         let top = best(told)?;
-        let swings = |one: &Told| one.slow.iter().any(|slow| slow.frequency > 0.0);
+        let swings = |one: &NoiseAtPoint| one.slow.iter().any(|slow| slow.frequency > 0.0);
         let (is_swinging, before) = (swings(top), top.weight);
         let plain = told.iter().filter(|one| !swings(one)).max_by(|a, b| a.weight.total_cmp(&b.weight))?;
         let mut lengths = self.find_waves(plain);
@@ -508,12 +509,12 @@ impl Estimate {
     }
 
     /// Finds errors that repeat with position beside this noise, and adds them to the rows; returns their wavelengths.
-    fn find_waves(&mut self, noise: &Told) -> Vec<f64> {
+    fn find_waves(&mut self, noise: &NoiseAtPoint) -> Vec<f64> {
         let mut lengths = Vec::new();
         let mut amplitudes = DVector::zeros(0);
         while lengths.len() < WAVES {
             let found = place::wave(&self.series, amplitudes.as_slice(), &noise.slow, noise.white);
-            let Some(place::Found { kappa, gain, amplitude, travel, tried }) = found else { break };
+            let Some(place::PeriodicError { kappa, gain, amplitude, travel, tried }) = found else { break };
             let least = (ROUNDED * self.step).max(NOTHING * travel);
             if gain < WAVE_CLEAR + (tried as f64).ln() || amplitude / self.weight < least {
                 break;
@@ -528,7 +529,7 @@ impl Estimate {
     }
 
     /// The waves in the rows under this noise, the shift of the globals by them, and its covariance.
-    fn waves(&self, noise: &Told, lengths: &[f64]) -> (Vec<Wave>, DVector<f64>, DMatrix<f64>) {
+    fn waves(&self, noise: &NoiseAtPoint, lengths: &[f64]) -> (Vec<Wave>, DVector<f64>, DMatrix<f64>) {
         let g = self.globals;
         let nothing = (Vec::new(), DVector::zeros(g), DMatrix::zeros(g, g));
         if lengths.is_empty() {
@@ -609,7 +610,7 @@ impl Estimate {
 }
 
 /// The most likely noise.
-fn best(told: &[Told]) -> Option<&Told> {
+fn best(told: &[NoiseAtPoint]) -> Option<&NoiseAtPoint> {
     told.iter().max_by(|a, b| a.weight.total_cmp(&b.weight)).filter(|one| one.weight.is_finite())
 }
 

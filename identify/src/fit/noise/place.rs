@@ -14,7 +14,7 @@ use crate::fit::limits::{BOTH_WAYS, FEWEST_WAVES, MOST_WAVE_NUMBERS, WAVE_CLEAR,
 use std::f64::consts::TAU;
 
 /// An error that is periodic in position.
-pub(super) struct Found {
+pub(super) struct PeriodicError {
     /// Its wave number, rad in the quantity's unit.
     pub kappa: f64,
     /// Least increase of the log-likelihood by it.
@@ -27,7 +27,7 @@ pub(super) struct Found {
 }
 
 /// The wave that reduces the residuals most, after subtraction of the waves in the rows with these amplitudes.
-pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64) -> Option<Found> {
+pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64) -> Option<PeriodicError> {
     let values = || all.iter().flat_map(|series| &series.value).copied();
     let (low, high) = values().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
     let travel = high - low;
@@ -61,7 +61,7 @@ pub(super) fn wave(all: &[Series], amplitudes: &[f64], slow: &[Slow], white: f64
             step *= 0.5;
         }
     }
-    Some(Found { kappa, gain: most.0 / white, amplitude: most.1, travel, tried: count })
+    Some(PeriodicError { kappa, gain: most.0 / white, amplitude: most.1, travel, tried: count })
 }
 
 /// Increase of the log-likelihood by a wave, times the variance of white noise; and its amplitude.

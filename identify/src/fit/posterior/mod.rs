@@ -13,7 +13,7 @@ use crate::case::{Case, Plan, Prior, file_name};
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
-use crate::fit::asked::run::{Extra, Nuisance, Run};
+use crate::fit::asked::run::{Extra, FittedLog, Nuisance};
 use crate::fit::limits::{DIVERGING, EFFECTIVE, HUBER, NORMAL, R_HAT};
 use crate::fit::search::point::Ending;
 use crate::fit::search::triangle::inverse_of_square;
@@ -284,7 +284,7 @@ fn scales<'a>(problem: &'a Problem<'a>) -> Vec<Scale<'a>> {
         let name = extra.what.name(machine);
         scales.push(Scale::of_extra((name.clone(), name), extra.what.unit(machine), *extra));
     }
-    let of_log = |run: &Run| match run.window {
+    let of_log = |run: &FittedLog| match run.window {
         0 => file_name(&run.name),
         window => format!("{}-{}", file_name(&run.name), window + 1),
     };

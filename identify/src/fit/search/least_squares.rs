@@ -250,13 +250,13 @@ mod tests {
     }
 
     /// A rung with a given end that records its use.
-    struct Told {
+    struct RecordingRung {
         ends: Vec<Climb>,
         own: Strategy,
         climbed: Rc<RefCell<Vec<Strategy>>>,
     }
 
-    impl Rung for Told {
+    impl Rung for RecordingRung {
         fn strategy(&self) -> Strategy {
             self.own
         }
@@ -281,7 +281,7 @@ mod tests {
             let mut names = [Damped, Bundle, Evolution].into_iter();
             let mut ladder = ends.map(|ends| {
                 let own = names.next().unwrap();
-                Box::new(Told { ends, own, climbed: climbed.clone() }) as Box<dyn Rung>
+                Box::new(RecordingRung { ends, own, climbed: climbed.clone() }) as Box<dyn Rung>
             });
             let toy = &mut Differenced;
             let mut at = Point::new(toy, &START, &bounds, &options).unwrap();

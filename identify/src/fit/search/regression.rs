@@ -10,7 +10,7 @@
 
 use super::triangle::inverse_of_square;
 use crate::fit::asked::problem::Problem;
-use crate::fit::asked::run::Run;
+use crate::fit::asked::run::FittedLog;
 use crate::fit::limits::{
     LONGEST_DELAY, LONGEST_SHIFT, REGRESSION_BLOCK, REGRESSION_NOISE, REST_ROWS, SHIFT_SHARE, SHIFT_STRIDE,
     SHIFT_UNEXPLAINED, SHORTEST_DELAY, SUSPECT_DELAY, SUSPECT_SHIFT, WIDEST_IN_REGRESSION, WIDTHS,
@@ -47,7 +47,7 @@ pub fn regression(problem: &Problem) -> Option<Balance> {
 
 /// A log with the derivatives of its position.
 pub(crate) struct Smoothed<'a> {
-    run: &'a Run,
+    run: &'a FittedLog,
     machine: &'a Machine,
     output: usize,
     /// Rows without derivatives at each end.
@@ -133,7 +133,7 @@ pub(crate) fn balance(logs: &[Smoothed], late: isize) -> Option<Balance> {
 
 impl<'a> Smoothed<'a> {
     /// Regression of one output of a run; `None` if it is too short.
-    fn new(run: &'a Run, machine: &'a Machine, output: usize, noise: f64) -> Option<Self> {
+    fn new(run: &'a FittedLog, machine: &'a Machine, output: usize, noise: f64) -> Option<Self> {
         let seen = &run.seen[output];
         let (n, h) = (run.fitted_rows.min(run.time.len()), run.interval());
         let mut derivatives = None;

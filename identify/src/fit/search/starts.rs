@@ -9,7 +9,7 @@ use crate::chance;
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
-use crate::fit::asked::run::Run;
+use crate::fit::asked::run::FittedLog;
 use crate::fit::limits::{
     FILE_ROUNDING, FIRST_BEGINNING, HUBER, LEAST_ROWS, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE,
     SAME_MINIMUM, SHORTEST_BEGINNING, START_WINDOWS, STEPS, STEPS_IN_PART, SWINGS_KEEP, TRIAL_ITERATIONS,
@@ -294,7 +294,7 @@ fn by_beginnings(
     descend: &mut Descend,
 ) -> Result<Vec<f64>> {
     let (plan, mut guess) = (Plan { until: None, ..plan.clone() }, start.to_vec());
-    let end = problem.runs.iter().map(Run::length).fold(0.0, f64::max);
+    let end = problem.runs.iter().map(FittedLog::length).fold(0.0, f64::max);
     let modes = resonances(&problem.machine, Drive::Held, 0).unwrap_or_default();
     let slowest = modes.iter().map(|mode| mode.frequency).fold(f64::INFINITY, f64::min);
     let first = (FIRST_BEGINNING / slowest).max(end * SHORTEST_BEGINNING);
@@ -372,7 +372,7 @@ fn in_windows(
     if plan.windows.is_some() || plan.closed_loop || globals == 0 {
         return Ok(None);
     }
-    let total: f64 = problem.runs.iter().map(Run::length).sum();
+    let total: f64 = problem.runs.iter().map(FittedLog::length).sum();
     let rows: usize = problem.runs.iter().map(|run| run.time.len()).sum();
     let (mut guess, mut best) = (start.to_vec(), None);
     for length in std::iter::once(None).chain(START_WINDOWS.map(Some)) {
@@ -400,7 +400,7 @@ fn in_windows(
 /// True if residuals are within the noise of the logs, estimated by third differences, which motion only increases.
 pub(crate) fn is_noise(problem: &Problem, at: &Minimum) -> bool {
     let noise = problem.noise();
-    let is_own = |(index, run): (usize, &Run)| {
+    let is_own = |(index, run): (usize, &FittedLog)| {
         let (first, n) = (problem.first_row(index), run.time.len());
         run.seen.iter().enumerate().all(|(output, seen)| {
             let of = |k: usize| at.residuals[first + output * n + k] / seen.weights[k];

@@ -3,7 +3,7 @@
 use super::scores::{LogFit, compared};
 use crate::case::Plan;
 use crate::fit::asked::problem::Problem;
-use crate::fit::asked::run::{Extra, Nuisance, Run};
+use crate::fit::asked::run::{Extra, FittedLog, Nuisance};
 use crate::fit::limits::{HELD_OUT_ROWS, REFIT_TOLERANCE};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Options};
@@ -23,7 +23,7 @@ pub(crate) struct Known<'a> {
 
 /// A log compared with the machine: delay, gain and offsets are those of the fitted logs. Its start is fitted to the
 /// first `share` of its rows.
-pub(crate) fn met(run: &Run, machine: &Machine, known: &Known, share: f64) -> LogFit {
+pub(crate) fn met(run: &FittedLog, machine: &Machine, known: &Known, share: f64) -> LogFit {
     let mut alone = run.clone();
     for extra in alone.extras.iter_mut().filter(|extra| !extra.what.is_start()) {
         let mean = known.means.iter().find(|(what, _)| *what == extra.what);

@@ -9,7 +9,7 @@
 use super::finding::{Finding, Grade};
 use super::sub_records::in_windows;
 use crate::case::{Case, Plan};
-use crate::fit::asked::run::Run;
+use crate::fit::asked::run::FittedLog;
 use crate::fit::asked::straight::has_exact_derivatives;
 use crate::fit::limits::{
     HUBER, INTERRUPTED, INTERRUPTED_SHARE, INTERRUPTED_WINDOWS, LEAST_INTERRUPTED, UNEXPLAINED_NOISE, UNINTERRUPTED,
@@ -30,9 +30,9 @@ pub(super) fn interruptions(case: &Case, plan: &Plan, found: &Searched) -> Vec<F
         return Vec::new();
     }
     let runs = &found.problem.runs;
-    let total: f64 = runs.iter().map(Run::length).sum();
+    let total: f64 = runs.iter().map(FittedLog::length).sum();
     let samples = runs.iter().map(|run| run.time.len()).sum::<usize>() as f64;
-    let longest = runs.iter().map(Run::length).fold(0.0, f64::max);
+    let longest = runs.iter().map(FittedLog::length).fold(0.0, f64::max);
     let window = (longest / INTERRUPTED_WINDOWS).max(WINDOW_SAMPLES * total / samples);
     by_windows(case, plan, found, window).unwrap_or_default()
 }

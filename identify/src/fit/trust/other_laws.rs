@@ -16,7 +16,7 @@ use super::doubts::{OtherLaw, falling};
 use super::uncertainty::Judged;
 use crate::fit::asked::drifting;
 use crate::fit::asked::problem::Problem;
-use crate::fit::asked::run::Run;
+use crate::fit::asked::run::FittedLog;
 use crate::fit::limits::{
     DRIFT_PARTS, FILE_ROUNDING, LAW_DUST, LAW_FIRST, LAW_KEEPS, LAW_LEAST, LAW_MOST, LAW_ROUNDS, LAW_SHARES, LAW_SHOWN,
     NORMAL, STRIBECK_SHARES,
@@ -70,7 +70,7 @@ impl Body {
 
 /// A law that a body might have.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Kind {
+enum AlternativeLaw {
     /// Friction that falls with speed, with this Stribeck velocity.
     Stribeck(f64),
     /// More Coulomb friction forward, and as much less backward.
@@ -81,27 +81,27 @@ enum Kind {
     Sway,
 }
 
-impl Kind {
+impl AlternativeLaw {
     /// Its name in results.
     fn key(self) -> &'static str {
         match self {
-            Kind::Stribeck(_) => "stribeck",
-            Kind::Sided => "sided",
-            Kind::Drift => "drift",
-            Kind::Sway => "sway",
+            AlternativeLaw::Stribeck(_) => "stribeck",
+            AlternativeLaw::Sided => "sided",
+            AlternativeLaw::Drift => "drift",
+            AlternativeLaw::Sway => "sway",
         }
     }
 
     /// True for a drift along the log, whose amplitude is relative to friction.
     fn is_along(self) -> bool {
-        matches!(self, Kind::Drift | Kind::Sway)
+        matches!(self, AlternativeLaw::Drift | AlternativeLaw::Sway)
     }
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Candidate {
     body: Body,
-    kind: Kind,
+    kind: AlternativeLaw,
     /// Coulomb friction of the body as fitted.
     coulomb: f64,
 }
@@ -116,20 +116,20 @@ impl Candidate {
     fn put(self, machine: &mut Machine, amplitude: f64, share: f64) {
         let friction = self.body.friction(machine);
         match self.kind {
-            Kind::Stribeck(velocity) => {
+            AlternativeLaw::Stribeck(velocity) => {
                 friction.law = Law::Stribeck { velocity, shape: Shape::Gaussian };
                 for side in [&mut friction.forward, &mut friction.backward] {
                     side.breakaway = side.coulomb + amplitude;
                 }
             }
-            Kind::Sided => {
+            AlternativeLaw::Sided => {
                 for (side, sign) in [(&mut friction.forward, 1.0), (&mut friction.backward, -1.0)] {
                     side.coulomb += sign * amplitude;
                     side.breakaway = side.breakaway.max(side.coulomb);
                 }
             }
-            Kind::Drift | Kind::Sway => {
-                let along = if self.kind == Kind::Drift { 2.0 * share - 1.0 } else { (TAU * share).sin() };
+            AlternativeLaw::Drift | AlternativeLaw::Sway => {
+                let along = if self.kind == AlternativeLaw::Drift { 2.0 * share - 1.0 } else { (TAU * share).sin() };
                 let factor = 1.0 + amplitude * along;
                 for side in [&mut friction.forward, &mut friction.backward] {
                     side.viscous *= factor;
@@ -143,9 +143,9 @@ impl Candidate {
     /// Range of the law's amplitude.
     fn range(self) -> (f64, f64) {
         match self.kind {
-            Kind::Stribeck(_) => (LAW_LEAST * self.coulomb, LAW_MOST * self.coulomb),
-            Kind::Sided => (-0.9 * self.coulomb, 0.9 * self.coulomb),
-            Kind::Drift | Kind::Sway => (-0.9, 0.9),
+            AlternativeLaw::Stribeck(_) => (LAW_LEAST * self.coulomb, LAW_MOST * self.coulomb),
+            AlternativeLaw::Sided => (-0.9 * self.coulomb, 0.9 * self.coulomb),
+            AlternativeLaw::Drift | AlternativeLaw::Sway => (-0.9, 0.9),
         }
     }
 
@@ -154,18 +154,20 @@ impl Candidate {
         let (force, speed) = self.body.units();
         let whose = self.body.key().replace('_', " ");
         match self.kind {
-            Kind::Stribeck(velocity) => falling(self.body.key(), &shown(amplitude, force), &shown(velocity, speed)),
-            Kind::Sided => format!(
+            AlternativeLaw::Stribeck(velocity) => {
+                falling(self.body.key(), &shown(amplitude, force), &shown(velocity, speed))
+            }
+            AlternativeLaw::Sided => format!(
                 "Coulomb friction of the {whose} that is {} {} forward than backward",
                 shown(2.0 * amplitude.abs(), force),
                 if amplitude > 0.0 { "greater" } else { "less" }
             ),
-            Kind::Drift => format!(
+            AlternativeLaw::Drift => format!(
                 "friction of the {whose} that {} by {} % from the beginning of each log to its end",
                 if amplitude > 0.0 { "rises" } else { "falls" },
                 percent(200.0 * amplitude.abs())
             ),
-            Kind::Sway => format!(
+            AlternativeLaw::Sway => format!(
                 "friction of the {whose} that {} along each log by a sine of ±{} %",
                 if amplitude > 0.0 { "rises and falls" } else { "falls and rises" },
                 percent(100.0 * amplitude.abs())
@@ -196,7 +198,7 @@ struct Tried {
 }
 
 /// The end of the fit, shared by all candidates.
-struct Place<'a> {
+struct EndOfFit<'a> {
     problem: &'a Problem<'a>,
     x: &'a [f64],
     /// The variables that are not at a bound, a column of the Jacobian each.
@@ -211,7 +213,7 @@ pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
     let (problem, best) = (&found.problem, &found.best);
     let g = problem.globals();
     if problem.is_stopped()
-        || problem.runs.iter().any(Run::is_closed)
+        || problem.runs.iter().any(FittedLog::is_closed)
         || !judged.identifiability.complete()
         || best.at_bound[..g].contains(&true)
     {
@@ -225,7 +227,7 @@ pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
     let jacobian = best.jacobian.select_columns(&free);
     let inverse = inverse_of_square(&jacobian)?;
     let residuals = DVector::from_column_slice(&best.residuals);
-    let place = Place { problem, x: &best.x, free, residuals, jacobian, inverse };
+    let place = EndOfFit { problem, x: &best.x, free, residuals, jacobian, inverse };
     let tried = candidates.into_iter().filter_map(|candidate| place.attempt(candidate, candidate.first()));
     let mut tried = tried.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     // Independent residuals must show it, too.
@@ -257,8 +259,16 @@ fn candidates(problem: &Problem, x: &[f64]) -> Vec<Candidate> {
             continue;
         }
         let fastest = fastest(problem, x, body);
-        all.extend(STRIBECK_SHARES.map(|share| Candidate { body, kind: Kind::Stribeck(share * fastest), coulomb }));
-        all.extend([Kind::Sided, Kind::Drift, Kind::Sway].map(|kind| Candidate { body, kind, coulomb }));
+        all.extend(STRIBECK_SHARES.map(|share| Candidate {
+            body,
+            kind: AlternativeLaw::Stribeck(share * fastest),
+            coulomb,
+        }));
+        all.extend([AlternativeLaw::Sided, AlternativeLaw::Drift, AlternativeLaw::Sway].map(|kind| Candidate {
+            body,
+            kind,
+            coulomb,
+        }));
     }
     all
 }
@@ -278,7 +288,7 @@ fn fastest(problem: &Problem, x: &[f64], body: Body) -> f64 {
     most
 }
 
-impl Place<'_> {
+impl EndOfFit<'_> {
     /// The residuals at `x` with this amplitude of a law; `None` if the model fails with it.
     fn with(&self, candidate: Candidate, amplitude: f64, x: &[f64]) -> Option<DVector<f64>> {
         let mut residuals = vec![0.0; self.residuals.len()];
@@ -294,12 +304,14 @@ impl Place<'_> {
             };
             let rows = &mut residuals[first..first + run.rows()];
             let good = match candidate.kind {
-                Kind::Drift | Kind::Sway => {
+                AlternativeLaw::Drift | AlternativeLaw::Sway => {
                     let stages: Vec<Machine> =
                         (0..DRIFT_PARTS).map(|k| with((k as f64 + 0.5) / DRIFT_PARTS as f64)).collect();
                     drifting::residuals(run, &stages, &extras, rows)
                 }
-                Kind::Stribeck(_) | Kind::Sided => run.residuals(&mut bench, &with(0.5), &extras, rows),
+                AlternativeLaw::Stribeck(_) | AlternativeLaw::Sided => {
+                    run.residuals(&mut bench, &with(0.5), &extras, rows)
+                }
             };
             if !good {
                 return None;

@@ -2,7 +2,7 @@
 
 use super::uncertainty;
 use crate::case::Experiment;
-use crate::fit::asked::run::{Nuisance, Run, Setting};
+use crate::fit::asked::run::{FittedLog, LogOptions, Nuisance};
 use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::solve::Bench;
@@ -64,13 +64,13 @@ pub struct Score {
 /// offset. None if the experiment has no log.
 pub fn beside_log(machine: &Machine, experiment: &Experiment) -> Option<LogFit> {
     let log = experiment.log.as_ref()?;
-    let run = Run::all(experiment, log, &Setting::default()).pop()?;
+    let run = FittedLog::all(experiment, log, &LogOptions::default()).pop()?;
     Some(compared(&run, machine, &[], Vec::new()))
 }
 
 /// Compares model and log.
 pub(crate) fn compared(
-    run: &Run,
+    run: &FittedLog,
     machine: &Machine,
     extras: &[f64],
     told: Vec<(Nuisance, f64, Option<f64>)>,

@@ -15,7 +15,7 @@ use super::doubts::Disagreement;
 use super::uncertainty::Judged;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
-use crate::fit::asked::run::Run;
+use crate::fit::asked::run::FittedLog;
 use crate::fit::limits::{COLOURED, FEWEST_WINDOWS, REFIT_TOLERANCE, WINDOW_SAMPLES, WINDOWS_OFF};
 use crate::fit::noise::student::student;
 use crate::fit::search::least_squares::minimise;
@@ -36,7 +36,7 @@ pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &
     if skipped || whole.is_stopped() || !judged.identifiability.complete() || found.best.at_bound[..g].contains(&true) {
         return None;
     }
-    let lengths = whole.runs.iter().map(Run::length);
+    let lengths = whole.runs.iter().map(FittedLog::length);
     let total: f64 = lengths.clone().sum();
     let shortest = lengths.fold(f64::INFINITY, f64::min);
     let samples = whole.runs.iter().map(|run| run.time.len()).sum::<usize>() as f64;

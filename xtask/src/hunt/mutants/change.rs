@@ -19,11 +19,11 @@ pub struct Change {
     pub place: Range<usize>,
     was: String,
     will: String,
-    kind: Kind,
+    kind: ChangeKind,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Kind {
+enum ChangeKind {
     /// An expression becomes another.
     Expression,
     /// A statement is left out.
@@ -37,9 +37,9 @@ impl Change {
     pub fn switched(&self, k: usize) -> String {
         let (was, will) = (&self.was, &self.will);
         match self.kind {
-            Kind::Expression => format!("(if crate::mutant::on({k}) {{ {will} }} else {{ {was} }})"),
-            Kind::Statement => format!("if !crate::mutant::on({k}) {{ {was} }}"),
-            Kind::Return => format!("{{ if crate::mutant::on({k}) {{ return {will}; }} {was} }}"),
+            ChangeKind::Expression => format!("(if crate::mutant::on({k}) {{ {will} }} else {{ {was} }})"),
+            ChangeKind::Statement => format!("if !crate::mutant::on({k}) {{ {was} }}"),
+            ChangeKind::Return => format!("{{ if crate::mutant::on({k}) {{ return {will}; }} {was} }}"),
         }
     }
 }
@@ -52,9 +52,9 @@ impl fmt::Display for Change {
         };
         write!(f, "{}:{} {}: ", self.file, self.line, self.within)?;
         match self.kind {
-            Kind::Expression => write!(f, "`{}` becomes `{}`", short(&self.was), short(&self.will)),
-            Kind::Statement => write!(f, "`{}` is left out", short(&self.was)),
-            Kind::Return => write!(f, "returns `{}` at once", self.will),
+            ChangeKind::Expression => write!(f, "`{}` becomes `{}`", short(&self.was), short(&self.will)),
+            ChangeKind::Statement => write!(f, "`{}` is left out", short(&self.was)),
+            ChangeKind::Return => write!(f, "returns `{}` at once", self.will),
         }
     }
 }
@@ -106,7 +106,7 @@ struct Finder<'a> {
 }
 
 impl Finder<'_> {
-    fn add(&mut self, spanned: &impl Spanned, will: impl Into<String>, kind: Kind) {
+    fn add(&mut self, spanned: &impl Spanned, will: impl Into<String>, kind: ChangeKind) {
         let place = spanned.span().byte_range();
         let line = spanned.span().start().line;
         let was = self.text[place.clone()].to_string();
@@ -122,7 +122,7 @@ impl Finder<'_> {
         self.within.push(name.to_string());
         if let syn::ReturnType::Type(_, kind) = output {
             for value in defaults(&self.text_of(kind)) {
-                self.add(block, *value, Kind::Return);
+                self.add(block, *value, ChangeKind::Return);
             }
         }
         self.visit_block(block);
@@ -134,7 +134,7 @@ impl Finder<'_> {
         let text = self.text_of(condition);
         let has_pattern = text.split(|c: char| !c.is_alphanumeric()).any(|word| word == "let");
         if !has_pattern {
-            self.add(condition, format!("!({text})"), Kind::Expression);
+            self.add(condition, format!("!({text})"), ChangeKind::Expression);
         }
     }
 }
@@ -213,7 +213,7 @@ impl<'a> Visit<'a> for Finder<'_> {
     fn visit_stmt(&mut self, statement: &'a Stmt) {
         if let Stmt::Expr(Expr::MethodCall(_) | Expr::Assign(_) | Expr::Call(_) | Expr::Binary(_), Some(_)) = statement
         {
-            self.add(statement, "", Kind::Statement);
+            self.add(statement, "", ChangeKind::Statement);
         }
         visit::visit_stmt(self, statement);
     }
@@ -228,7 +228,7 @@ impl<'a> Visit<'a> for Finder<'_> {
         let has_pattern = matches!(*expression.left, Expr::Let(_)) || matches!(*expression.right, Expr::Let(_));
         if !has_pattern {
             for other in others(&expression.op) {
-                self.add(expression, format!("{left} {other} {right}"), Kind::Expression);
+                self.add(expression, format!("{left} {other} {right}"), ChangeKind::Expression);
             }
         }
         visit::visit_expr_binary(self, expression);
@@ -236,7 +236,7 @@ impl<'a> Visit<'a> for Finder<'_> {
 
     fn visit_expr_unary(&mut self, expression: &'a syn::ExprUnary) {
         if matches!(expression.op, UnOp::Neg(_) | UnOp::Not(_)) {
-            self.add(expression, self.text_of(&expression.expr), Kind::Expression);
+            self.add(expression, self.text_of(&expression.expr), ChangeKind::Expression);
         }
         visit::visit_expr_unary(self, expression);
     }
@@ -246,10 +246,10 @@ impl<'a> Visit<'a> for Finder<'_> {
         match &expression.lit {
             Lit::Float(value) => {
                 let zero = value.base10_parse::<f64>().is_ok_and(|value| value == 0.0);
-                self.add(expression, if zero { "1.0".into() } else { format!("2.0 * {text}") }, Kind::Expression);
+                self.add(expression, if zero { "1.0".into() } else { format!("2.0 * {text}") }, ChangeKind::Expression);
             }
-            Lit::Int(_) => self.add(expression, format!("{text} + 1"), Kind::Expression),
-            Lit::Bool(value) => self.add(expression, (!value.value).to_string(), Kind::Expression),
+            Lit::Int(_) => self.add(expression, format!("{text} + 1"), ChangeKind::Expression),
+            Lit::Bool(value) => self.add(expression, (!value.value).to_string(), ChangeKind::Expression),
             _ => {}
         }
     }

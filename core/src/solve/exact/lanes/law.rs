@@ -100,13 +100,13 @@ type Fixed = Vec<(u8, f64)>;
 
 /// Where a quantity is found: its slot, its factor to the form there, and a limit of its magnitude.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Seen {
+pub(super) struct ReadingSlot {
     pub(super) slot: usize,
     pub(super) factor: f64,
     pub(super) limit: f64,
 }
 
-impl Seen {
+impl ReadingSlot {
     /// The quantity by the value in its slot.
     pub(super) fn of(self, value: f64) -> f64 {
         (self.factor * value).clamp(-self.limit, self.limit)
@@ -120,7 +120,7 @@ impl<const S: usize, const D: usize> Readings<S, D> {
         sums: &[Vec<(usize, f64)>],
         plan: &Plan<N>,
         alike: bool,
-    ) -> Option<(Self, Vec<Seen>)> {
+    ) -> Option<(Self, Vec<ReadingSlot>)> {
         let (mut forms, mut seen) = (Vec::with_capacity(sums.len()), Vec::with_capacity(sums.len()));
         let mut rows: Vec<[f64; N]> = Vec::with_capacity(sums.len());
         for sum in sums {
@@ -141,7 +141,7 @@ impl<const S: usize, const D: usize> Readings<S, D> {
                 rows.push(row);
                 rows.len() - 1
             });
-            seen.push(Seen { slot, factor, limit });
+            seen.push(ReadingSlot { slot, factor, limit });
         }
         Some((Self { forms }, seen))
     }

@@ -39,7 +39,7 @@ use crate::solve::observe::{Extremes, NEWS, Polynomial};
 use crate::solve::propagator::SERIES_TERMS;
 use crate::solve::{Ending, Grid, Outcome, check, roots};
 use flight::{Flight, Moving, Width, numbers};
-use law::{Law, Parts, Plan, Readings, Seen, Slots, all_slide, reads_alike};
+use law::{Law, Parts, Plan, ReadingSlot, Readings, Slots, all_slide, reads_alike};
 use part::{INNER, Part, TERMS};
 use peak::{Later, Start};
 use std::cell::RefCell;
@@ -149,7 +149,7 @@ struct Kept<const N: usize, const S: usize, const D: usize> {
     /// Steps in a second of the fastest mode.
     fastest: f64,
     /// By the quantities of the observer.
-    seen: Vec<Seen>,
+    seen: Vec<ReadingSlot>,
     /// Readings for every mode, if none depends on it.
     readings: Option<Arc<Readings<S, D>>>,
 }

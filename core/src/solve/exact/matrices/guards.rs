@@ -128,7 +128,7 @@ pub(in crate::solve::exact) type Values = [f64; GUARDS];
 
 /// Buffers for evaluations of the guards.
 #[derive(Clone)]
-pub(in crate::solve::exact) struct Room<const N: usize> {
+pub(in crate::solve::exact) struct GuardBuffers<const N: usize> {
     /// ż and its size at the last evaluation.
     pub(in crate::solve::exact) rate: [f64; N],
     pub(in crate::solve::exact) size: Size,
@@ -140,7 +140,7 @@ pub(in crate::solve::exact) struct Room<const N: usize> {
     pub(in crate::solve::exact) coefficients: [f64; SERIES_TERMS],
 }
 
-impl<const N: usize> Room<N> {
+impl<const N: usize> GuardBuffers<N> {
     pub(in crate::solve::exact) fn new() -> Self {
         let none = [0.0; GUARDS];
         let (series, coefficients) = (Series::room(), [0.0; SERIES_TERMS]);

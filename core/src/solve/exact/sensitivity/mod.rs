@@ -28,7 +28,7 @@ use crate::solve::propagator::Series;
 use crate::trajectory::Grid;
 use std::sync::Arc;
 pub(super) use tangent::Sloped;
-use tangent::{Seen, Tangent, Varied, are_alike};
+use tangent::{RelativeMachine, Tangent, Varied, are_alike};
 
 /// A guard whose rate is at most this multiple of its rounding only grazes.
 const GRAZES: f64 = 1e5;
@@ -65,7 +65,7 @@ struct Follower<'t, const N: usize> {
     row: u64,
     /// Number of rows output so far.
     rows: u64,
-    seen: Seen,
+    seen: RelativeMachine,
     /// By variable; `None` for a variable of the input.
     varied: Vec<Option<Varied>>,
     /// Indices of the variables in `s`, those that change the equations first.
@@ -89,11 +89,11 @@ impl<'t, const N: usize> Follower<'t, N> {
         let Task { mechanism, experiment, variables, outputs } = task;
         let grid = Grid::new(experiment.every, experiment.until);
         let start = mechanism.begun(&experiment.initial);
-        let seen = Seen::new(mechanism, &start, task.space(mechanism));
+        let seen = RelativeMachine::new(mechanism, &start, task.space(mechanism));
         let ends = (grid.interval(), grid.end());
         let mut core = Core::new(Arc::clone(&seen.mechanism), Arc::new(task.space(mechanism)), &start, ends, known);
         core.errors = None;
-        let of = |begun: &Begun| Seen::new(&begun.mechanism, &begun.start, task.space(&begun.mechanism));
+        let of = |begun: &Begun| RelativeMachine::new(&begun.mechanism, &begun.start, task.space(&begun.mechanism));
         let mut varied = Vec::new();
         for variable in variables {
             varied.push(match variable {
@@ -384,8 +384,8 @@ impl<'t, const N: usize> Follower<'t, N> {
 }
 
 /// ∂z/∂p at the start.
-fn begin<const N: usize>(seen: &Seen, varied: &Varied) -> [f64; N] {
-    let at = |seen: &Seen| vector::<N>(&seen.space.layout, &seen.inner);
+fn begin<const N: usize>(seen: &RelativeMachine, varied: &Varied) -> [f64; N] {
+    let at = |seen: &RelativeMachine| vector::<N>(&seen.space.layout, &seen.inner);
     let [here, first, second] = [at(seen), at(&varied.points[0]), at(&varied.points[1])];
     std::array::from_fn(|k| varied.slope(here[k], first[k], second[k]))
 }

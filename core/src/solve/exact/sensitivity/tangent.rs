@@ -20,14 +20,14 @@ const DISTANCES: usize = 6;
 const SAME: f64 = 1e-11;
 
 /// A machine with positions counted from the start of its run.
-pub(super) struct Seen {
+pub(super) struct RelativeMachine {
     pub(super) mechanism: Arc<Mechanism>,
     pub(super) space: Space,
     pub(super) coordinates: Coordinates,
     pub(super) inner: State,
 }
 
-impl Seen {
+impl RelativeMachine {
     pub(super) fn new(mechanism: &Arc<Mechanism>, start: &State, space: Space) -> Self {
         let (coordinates, inner) = Coordinates::new(&space.layout, start);
         Self { mechanism: mechanism.seen_by(&space.layout, start), space, coordinates, inner }
@@ -38,7 +38,7 @@ impl Seen {
 pub(super) struct Varied {
     /// The machines as they were given, counted from zero.
     pub(super) machines: [Arc<Mechanism>; 2],
-    pub(super) points: [Seen; 2],
+    pub(super) points: [RelativeMachine; 2],
     pub(super) weights: [f64; 3],
     /// True if the start alone differs, and so neither equations nor guards do.
     pub(super) is_start: bool,
@@ -96,7 +96,7 @@ impl<const N: usize> Sloped<N> {
     pub(super) fn of(
         known: &mut Vec<Self>,
         law: &Arc<ModeMatrices<N>>,
-        seen: &Seen,
+        seen: &RelativeMachine,
         machines: &[&Varied],
     ) -> Option<usize> {
         let same = |(own, weights): &([Arc<Mechanism>; 2], [f64; 3]), varied: &&Varied| {
@@ -115,7 +115,7 @@ impl<const N: usize> Sloped<N> {
         Some(known.len() - 1)
     }
 
-    fn new(law: &Arc<ModeMatrices<N>>, seen: &Seen, machines: &[&Varied]) -> Option<Self> {
+    fn new(law: &Arc<ModeMatrices<N>>, seen: &RelativeMachine, machines: &[&Varied]) -> Option<Self> {
         let here = Equated::<N>::new(seen, &law.mode);
         let (mut slopes, mut guards) = (Vec::new(), Vec::new());
         for varied in machines {
@@ -172,11 +172,13 @@ impl Tangent {
     pub(super) fn new<const N: usize>(
         sloped: usize,
         mode: &Mode,
-        seen: &Seen,
+        seen: &RelativeMachine,
         variables: &[Option<Varied>],
         outputs: &[Differentiated],
     ) -> Option<Self> {
-        let rows = |seen: &Seen| outputs.iter().map(|output| row::<N>(seen, mode, *output)).collect::<Option<Vec<_>>>();
+        let rows = |seen: &RelativeMachine| {
+            outputs.iter().map(|output| row::<N>(seen, mode, *output)).collect::<Option<Vec<_>>>()
+        };
         let here = rows(seen)?;
         let mut output_slopes = Vec::new();
         for (j, varied) in variables.iter().enumerate() {
@@ -199,14 +201,14 @@ struct Equated<const N: usize> {
 }
 
 impl<const N: usize> Equated<N> {
-    fn new(seen: &Seen, mode: &Mode) -> Self {
+    fn new(seen: &RelativeMachine, mode: &Mode) -> Self {
         let (equations, rate) = straight::<N>(&seen.mechanism, &seen.space, mode);
         Self { rate, guards: equations.guards.iter().map(|guard| seen.space.row(&guard.form)).collect() }
     }
 }
 
 /// An output as a linear form of z; `None` if it is not linear.
-fn row<const N: usize>(seen: &Seen, mode: &Mode, output: Differentiated) -> Option<[f64; N]> {
+fn row<const N: usize>(seen: &RelativeMachine, mode: &Mode, output: Differentiated) -> Option<[f64; N]> {
     let (mechanism, space) = (&seen.mechanism, &seen.space);
     let scaled = |mut row: [f64; N], factor: f64| {
         row.iter_mut().for_each(|weight| *weight *= factor);
@@ -248,7 +250,7 @@ fn row<const N: usize>(seen: &Seen, mode: &Mode, output: Differentiated) -> Opti
 }
 
 /// True if two machines have the same parts, so that differences between them are derivatives.
-pub(super) fn are_alike(a: &Seen, b: &Seen) -> bool {
+pub(super) fn are_alike(a: &RelativeMachine, b: &RelativeMachine) -> bool {
     use std::mem::discriminant;
     let (own, other) = (&a.mechanism, &b.mechanism);
     let bodies = own.bodies.len() == other.bodies.len()
@@ -262,6 +264,7 @@ pub(super) fn are_alike(a: &Seen, b: &Seen) -> bool {
             && a.amplifier.voltage_limit.is_some() == b.amplifier.voltage_limit.is_some()
             && a.amplifier.current_limit.is_some() == b.amplifier.current_limit.is_some()
     });
-    let places = |seen: &Seen| (seen.space.layout.states, seen.space.layout.coordinate, seen.space.layout.speed);
+    let places =
+        |seen: &RelativeMachine| (seen.space.layout.states, seen.space.layout.coordinate, seen.space.layout.speed);
     bodies && springs && drives && places(a) == places(b) && other.is_piecewise_linear()
 }

@@ -51,7 +51,7 @@ struct Stretch {
 
 /// Direction in which a path is extended.
 #[derive(Clone, Copy, PartialEq)]
-enum Way {
+enum PathDirection {
     Back,
     Forth,
 }
@@ -133,8 +133,8 @@ impl<'a> Chain<'a> {
     }
 
     /// A step of the leapfrog integrator.
-    fn leap(&mut self, from: &Point, way: Way) -> Point {
-        let step = if way == Way::Forth { self.step } else { -self.step };
+    fn leap(&mut self, from: &Point, way: PathDirection) -> Point {
+        let step = if way == PathDirection::Forth { self.step } else { -self.step };
         // r½ = r + ½ ε Lᵀ ∇ln π(q);  q′ = q + ε L r½;  r′ = r½ + ½ ε Lᵀ ∇ln π(q′)
         let half = &from.momentum + 0.5 * step * &from.force;
         let mut to = self.point(&from.position + step * &self.factor * &half);
@@ -153,7 +153,7 @@ impl<'a> Chain<'a> {
         let mut grows = None;
         for _ in 0..50 {
             self.kick();
-            let error = self.at.energy() - self.leap(&self.at.clone(), Way::Forth).energy();
+            let error = self.at.energy() - self.leap(&self.at.clone(), PathDirection::Forth).energy();
             let grow = error > log(ACCEPTANCE);
             if *grows.get_or_insert(grow) != grow {
                 return;
@@ -170,7 +170,7 @@ impl<'a> Chain<'a> {
         let energy = self.at.energy();
         let mut path = Stretch::of(self.at.clone(), 0.0);
         for doublings in 0..MOST_DOUBLINGS {
-            let way = if uniform(&mut self.random) < 0.5 { Way::Back } else { Way::Forth };
+            let way = if uniform(&mut self.random) < 0.5 { PathDirection::Back } else { PathDirection::Forth };
             let Ok(more) = self.extended(&path.ends[way as usize].clone(), way, doublings, energy) else { break };
             // The newer half is preferred: min(1, w′/w).
             let share = exp((more.weight - path.weight).min(0.0));
@@ -187,7 +187,7 @@ impl<'a> Chain<'a> {
     }
 
     /// 2 to the number of `doublings` steps from `from` on.
-    fn extended(&mut self, from: &Point, way: Way, doublings: usize, energy: f64) -> Result<Stretch, Ended> {
+    fn extended(&mut self, from: &Point, way: PathDirection, doublings: usize, energy: f64) -> Result<Stretch, Ended> {
         if doublings > 0 {
             let mut stretch = self.extended(from, way, doublings - 1, energy)?;
             let more = self.extended(&stretch.ends[way as usize].clone(), way, doublings - 1, energy)?;
@@ -216,8 +216,8 @@ impl Stretch {
 
     /// Adds the continuation in this direction, and its chosen point if `take` is true; returns true if the whole path
     /// makes a U-turn.
-    fn join(&mut self, more: Stretch, way: Way, take: bool) -> bool {
-        let [first, last] = if way == Way::Forth { [&*self, &more] } else { [&more, &*self] };
+    fn join(&mut self, more: Stretch, way: PathDirection, take: bool) -> bool {
+        let [first, last] = if way == PathDirection::Forth { [&*self, &more] } else { [&more, &*self] };
         let momenta = &first.momenta + &last.momenta;
         let [begin, end] = [&first.ends[0].momentum, &last.ends[1].momentum];
         let [seam_before, seam_after] = [&first.ends[1].momentum, &last.ends[0].momentum];
@@ -231,8 +231,8 @@ impl Stretch {
         self.momenta = momenta;
         let [begin, end] = more.ends;
         match way {
-            Way::Back => self.ends[0] = begin,
-            Way::Forth => self.ends[1] = end,
+            PathDirection::Back => self.ends[0] = begin,
+            PathDirection::Forth => self.ends[1] = end,
         }
         if take {
             self.chosen = more.chosen;

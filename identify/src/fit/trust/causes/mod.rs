@@ -26,7 +26,7 @@ use super::doubts::{Cause, OtherLaw};
 use super::parts::{Fold, Parts, errors};
 use super::uncertainty::Judged;
 use crate::case::{Case, Plan};
-use crate::fit::asked::run::Run;
+use crate::fit::asked::run::FittedLog;
 use crate::fit::limits::{
     CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSES_FITTED, COLOURED, HELD_OUT_SHOWS, NORMAL,
     SAME_MINIMUM, STARTS_FITTED,
@@ -154,7 +154,7 @@ pub(crate) fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judg
         && plan.separate.is_empty()
         && !plan.huber
         && !problem.is_stopped()
-        && !problem.runs.iter().any(Run::is_closed)
+        && !problem.runs.iter().any(FittedLog::is_closed)
         && problem.counted() <= CAUSE_MOST_VALUES
         && problem.machine.is_piecewise_linear()
         && !problem.parameters.is_empty()
