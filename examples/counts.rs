@@ -129,7 +129,7 @@ fn h_frame() -> taut::Result<Box<dyn Fn() -> f64>> {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/stages/h-frame/h-frame.toml");
     let case = Case::read_with(file, &[])?;
     let mechanism: Mechanism = case.machine.mechanism();
-    let course = Course::of(&mechanism, &case.experiments[2]);
+    let course = Course::new(&mechanism, &case.experiments[2]);
     Ok(Box::new(move || {
         let outcome = stream_mechanism(&mechanism, &course, Solver::Exact, (Detail::Full, None), &mut |block| {
             black_box(block);

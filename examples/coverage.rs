@@ -296,7 +296,7 @@ fn recorded(cell: &Cell, truth: [f64; 3], chance: &mut Chance) -> Case {
             let mut experiment = pattern.clone();
             (experiment.inputs[0], experiment.initial, experiment.every) = (input, initial, EVERY);
             experiment.until = (end - begin) as f64 * EVERY;
-            let run = simulate(&machine, &experiment, Solver::of(&machine))
+            let run = simulate(&machine, &experiment, Solver::for_machine(&machine))
                 .unwrap_or_else(|error| panic!("{error}"))
                 .trajectory;
             let column = |name: &str| run.get(name).unwrap_or_else(|| panic!("no column {name}"));

@@ -156,7 +156,8 @@ fn made(fault: Fault, seed: u64) -> Case {
     let mut experiment = case.experiments[0].clone();
     (experiment.until, experiment.every) = ((count - 1) as f64 * EVERY, EVERY);
     experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: values.clone(), hold: Hold::Zero };
-    let run = simulate(&truth, &experiment, Solver::of(&truth)).unwrap_or_else(|error| panic!("{error}")).trajectory;
+    let run =
+        simulate(&truth, &experiment, Solver::for_machine(&truth)).unwrap_or_else(|error| panic!("{error}")).trajectory;
     let column = |name: &str| run.get(name).unwrap_or_else(|| panic!("no column {name}")).to_vec();
     let step = TAU / COUNTS;
     let mut counted = |values: Vec<f64>, step: f64, tremble: f64| -> Vec<f64> {

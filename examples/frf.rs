@@ -86,7 +86,7 @@ fn log(machine: &Machine, closed: bool, delay: f64, seed: u64) -> taut::Result<L
     let limits = Limits { speed: 1.0, acceleration: 10.0, jerk: None, snap: None };
     let profile = Profile::new(0.0, &[Leg::To(1e-3, limits)])?;
     let timing = Loop { every: EVERY, delay, limit: None, lead: 0.0 };
-    close(machine, &mut [&mut exciter], &timing, &[profile], LENGTH, 1.0, Solver::of(machine))?;
+    close(machine, &mut [&mut exciter], &timing, &[profile], LENGTH, 1.0, Solver::for_machine(machine))?;
     // Once everything slides: the first second is left out.
     let from = (1.0 / EVERY) as usize;
     let cut = |values: &[f64]| values[from..].to_vec();
@@ -106,7 +106,7 @@ fn log(machine: &Machine, closed: bool, delay: f64, seed: u64) -> taut::Result<L
 
 /// The true response.
 fn truth(machine: &Machine, delay: f64, frf: &Frf) -> taut::Result<Vec<Complex<f64>>> {
-    let system = StateSpace::of(machine, Operation::default())?;
+    let system = StateSpace::new(machine, Operation::default())?;
     let output = system.output("drive_angle").unwrap_or_default();
     let model = system.discrete(EVERY, Hold::Zero, delay)?;
     Ok(frf.points.iter().map(|point| model.at(point.omega)[output]).collect())

@@ -109,13 +109,13 @@ impl Overview {
     /// use taut::case::{Case, TEMPLATE};
     /// use taut::overview::Overview;
     /// let case = Case::from_text_with("axis.toml", TEMPLATE, &[])?;
-    /// let overview = Overview::of(&case)?;
+    /// let overview = Overview::new(&case)?;
     /// // M + (J₁ + J₂)/r² = 0.362 kg + 2 · 6.3e-5 kg m² / (19.4 mm)²
     /// assert!((overview.value("total_mass").unwrap() - 0.69679).abs() < 1e-5);
     /// assert!(overview.notes.iter().any(|note| note.code == "no-damping"));
     /// # Ok::<(), taut::Error>(())
     /// ```
-    pub fn of(case: &Case) -> Result<Self> {
+    pub fn new(case: &Case) -> Result<Self> {
         let machine = &case.machine;
         let directions = Direction::all(machine);
         let places = belt::places(machine)?;

@@ -25,7 +25,7 @@ pub struct Reduction {
 impl Reduction {
     /// Runs `experiment` on the reduced `stage` and on its elastic model; none where there is nothing to compare: the
     /// stage is not reduced, no stiffness is given, or one of the runs does not reach its end.
-    pub fn of(machine: &Machine, experiment: &Experiment, solver: Solver) -> Result<Option<Self>> {
+    pub fn new(machine: &Machine, experiment: &Experiment, solver: Solver) -> Result<Option<Self>> {
         let known = machine.belt.stiffness.iter().all(|k| k.is_finite());
         if machine.belt.model == BeltModel::Elastic || !known {
             return Ok(None);

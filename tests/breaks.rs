@@ -168,7 +168,7 @@ fn the_worst_break_of_every_structure_is_that_of_a_dense_grid() {
         let (mut stable, mut beside, mut inner) = (0, [0.0_f64; 4], 0);
         for number in 0..count {
             let case = draw.case(*structure);
-            let (ours, other) = (margins(&case), Loop::of(&case));
+            let (ours, other) = (margins(&case), Loop::new(&case));
             let poles = other.poles(0, 1.0);
             let radius = poles.iter().map(|z| z.norm()).fold(0.0, f64::max);
             // At the limit itself rounding decides.

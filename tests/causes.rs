@@ -168,7 +168,7 @@ fn logged(seed: u64, case: &Case, other: &Machine, name: &str) -> Experiment {
     let mut experiment = case.experiments[0].clone();
     (experiment.until, experiment.every) = ((COUNT - 1) as f64 * EVERY, EVERY);
     experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
-    let run = simulate(other, &experiment, Solver::of(other)).unwrap().trajectory;
+    let run = simulate(other, &experiment, Solver::for_machine(other)).unwrap().trajectory;
     let position = run.get("cart_position").unwrap().iter().map(|x| x + 1e-5 * chance.normal()).collect();
     experiment.name = name.into();
     experiment.log = Some(columns(name, time, input, vec![output(Quantity::CartPosition, position)]));

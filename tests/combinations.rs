@@ -38,7 +38,7 @@ every = 1e-3
 
 fn run(changes: &[&str]) -> (Case, Solution) {
     let case = Case::from_text_with("axis.toml", AXIS, changes).unwrap();
-    let solution = simulate(&case.machine, &case.experiments[0], Solver::of(&case.machine)).unwrap();
+    let solution = simulate(&case.machine, &case.experiments[0], Solver::for_machine(&case.machine)).unwrap();
     assert_eq!(solution.outcome.ending, Ending::Complete, "{changes:?}");
     (case, solution)
 }
@@ -135,6 +135,6 @@ fn a_two_mass_belt_that_follows_the_cart() {
 #[test]
 fn a_rigid_belt_follows_the_cart_too() {
     let (case, follows) = run(&["belt.follows_cart=true", "belt.model=rigid"]);
-    assert_eq!(Solver::of(&case.machine), Solver::Exact);
+    assert_eq!(Solver::for_machine(&case.machine), Solver::Exact);
     assert_eq!(apart(&follows, &run(&["belt.model=rigid"]).1, "cart_position"), 0.0);
 }

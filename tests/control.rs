@@ -193,7 +193,7 @@ fn closed_loops_agree_with_the_authority() {
             let run = stream(
                 &machine,
                 &mut [&mut controller],
-                &Loop::of(&design),
+                &Loop::new(&design),
                 std::slice::from_ref(&profile),
                 &Rows { until: get("until"), every, window: 1e-4 },
                 solver,
@@ -325,7 +325,7 @@ proptest! {
         let limits = Limits { speed: 0.5, acceleration, jerk: None, snap: None };
         let profile = Profile::new(0.0, &[Leg::To(distance, limits)]).unwrap();
         let mut controller = Standard::new(&design, &machine).unwrap();
-        let timing = Loop::of(&design);
+        let timing = Loop::new(&design);
         let rows = Rows { until: 3.0, every: 1e-3, window: 1e-3 };
         let run = stream(&machine, &mut [&mut controller], &timing, std::slice::from_ref(&profile), &rows, Solver::Exact, true, &mut |_| Flow::Continue).unwrap();
         prop_assert_eq!(run.outcome.ending, Ending::Complete);
@@ -347,7 +347,7 @@ fn sliding_mode_keeps_its_bounds() {
     let design = Design { feed_forward: forward, ..design(Structure::SlidingMode(SLIDING)) };
     let limits = Limits { speed: 0.3, acceleration: 5.0, jerk: Some(300.0), snap: Some(4e4) };
     let profile = Profile::new(0.0, &[Leg::To(0.1, limits)]).unwrap();
-    let needed = sliding::required(&SLIDING, &Rigid::of(&machine), 0.2, limits.speed, limits.acceleration);
+    let needed = sliding::required(&SLIDING, &Rigid::new(&machine), 0.2, limits.speed, limits.acceleration);
     assert!(needed < SLIDING.reaching, "{needed}");
     let axes = spread(&machine, 0.2);
     assert!(axes.len() >= 16);
@@ -573,7 +573,7 @@ fn gains_of_drives_are_those_of_the_loop() {
 #[test]
 fn gains_for_drives_make_the_same_command() {
     let machine = Case::read("stages/sollmann-jouaneh/table4.toml").unwrap().machine;
-    let rigid = taut::machine::rigid::Rigid::of(&machine);
+    let rigid = taut::machine::rigid::Rigid::new(&machine);
     let gains = taut::control::drives::drive_gains(&machine);
     let value = |name: &str| gains.iter().find(|gain| gain.name == name).unwrap().value;
     let (speed, acceleration) = (0.3, 4.0);

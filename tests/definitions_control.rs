@@ -215,7 +215,7 @@ fn cascades_are_those_of_the_document() {
 #[test]
 fn sliding_mode_and_fuzzy_rules_are_those_of_the_document() {
     let case = Case::from_text_with("axis.toml", TEMPLATE, &AXIS).unwrap_or_else(|error| panic!("{error}"));
-    let one = Mass::of(&case);
+    let one = Mass::new(&case);
     #[derive(Default)]
     struct State {
         speed: Speed,
@@ -274,7 +274,7 @@ struct Mass {
 }
 
 impl Mass {
-    fn of(case: &Case) -> Self {
+    fn new(case: &Case) -> Self {
         let s = &case.machine;
         let (r, n) = (s.pulley_radius, s.drives[0].motor.gear_ratio);
         let pulleys = s.drive_pulley.inertia + n * n * s.drives[0].motor.rotor_inertia + s.idler_pulley.inertia;
@@ -317,7 +317,7 @@ fn command(case: &Case, force: f64, rate: f64, drive: &Reference) -> f64 {
 
 /// p = 0.9, q = 0.7.
 fn rigid_command(case: &Case, y: &Reference) -> f64 {
-    let (one, s) = (Mass::of(case), sign(y));
+    let (one, s) = (Mass::new(case), sign(y));
     let side = usize::from(s < 0.0);
     let friction = one.viscous[side] * y.speed + s * one.coulomb[side];
     let force = 0.9 * one.mass * y.acceleration + 0.7 * friction - case.machine.cart.load;
@@ -360,7 +360,7 @@ fn elastic(case: &Case, y: &Reference) -> (Reference, f64, f64) {
 /// p = 0.9, q = 0.7.
 fn elastic_command(case: &Case, y: &Reference) -> f64 {
     let (first, force, rate) = elastic(case, y);
-    let (one, s) = (Mass::of(case), sign(y));
+    let (one, s) = (Mass::new(case), sign(y));
     let side = usize::from(s < 0.0);
     let friction = one.viscous[side] * y.speed + s * one.coulomb[side];
     let less = (1.0 - 0.7) * friction + (1.0 - 0.9) * one.mass * first.acceleration;
@@ -371,7 +371,7 @@ fn elastic_command(case: &Case, y: &Reference) -> f64 {
 fn the_disturbance_observer_is_that_of_the_document() {
     use nalgebra::{Matrix3, Matrix4, RowVector3, Vector3};
     let case = Case::from_text_with("axis.toml", TEMPLATE, &AXIS).unwrap_or_else(|error| panic!("{error}"));
-    let (one, motor, r) = (Mass::of(&case), case.machine.drives[0].motor, case.machine.pulley_radius);
+    let (one, motor, r) = (Mass::new(&case), case.machine.drives[0].motor, case.machine.pulley_radius);
     let n = motor.gear_ratio;
     let d = one.viscous[0] + n * n * motor.torque_constant * motor.back_emf_constant / (motor.resistance * r * r);
     // ẏ = v, v̇ = −(d/M) v + (g/M)(u + w), ẇ = 0, held over T: e^{[A B; 0 0] T} by its series
@@ -411,7 +411,7 @@ fn the_disturbance_observer_is_that_of_the_document() {
         },
     );
     let dry = |case: &Case, y: &Reference| {
-        let (one, s) = (Mass::of(case), sign(y));
+        let (one, s) = (Mass::new(case), sign(y));
         [0.0, (s * one.coulomb[usize::from(s < 0.0)] - case.machine.cart.load) / one.push]
     };
     compare("pid = { proportional = 1500 }\ndisturbance_observer = { bandwidth = 8 }", made, dry, false);

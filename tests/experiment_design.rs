@@ -148,7 +148,7 @@ fn what_is_written_is_what_was_judged_and_keeps_its_limits() {
         for mass in [0.8, 1.0, 1.2] {
             let mut machine = read.machine.clone();
             machine.cart.mass *= mass;
-            let run = simulate(&machine, experiment, Solver::of(&machine)).unwrap().trajectory;
+            let run = simulate(&machine, experiment, Solver::for_machine(&machine)).unwrap().trajectory;
             let most = |name: &str| run.get(name).unwrap().iter().fold(0.0_f64, |most, value| most.max(value.abs()));
             assert!(most("motor_current") <= 0.9 * 2.0 * 1.002, "{kind:?}: {}", most("motor_current"));
             let x = run.get("cart_position").unwrap();

@@ -179,7 +179,7 @@ fn recorded(changes: &[&str], seed: u64, noise: f64) -> Case {
     let step = std::f64::consts::TAU / 2048.0;
     let mut chance = Chance::new(seed);
     for experiment in &mut case.experiments {
-        let run = simulate(&case.machine, experiment, Solver::of(&case.machine)).unwrap().trajectory;
+        let run = simulate(&case.machine, experiment, Solver::for_machine(&case.machine)).unwrap().trajectory;
         let angle = run.get("drive_angle").unwrap().iter();
         let values = angle.map(|v| step * ((v + noise * chance.normal()) / step).round()).collect();
         experiment.log = Some(logged(&experiment.name, &run, values));
@@ -494,7 +494,7 @@ fn a_loop_is_closed_again() {
     let rows = Rows { until: profile.end(), every: 1e-3, window: 1e-4 };
     let mut controller = Standard::new(&design, &case.machine).unwrap();
     let mut run = Trajectory::default();
-    let timing = Loop::of(&design);
+    let timing = Loop::new(&design);
     stream(&real.machine, &mut [&mut controller], &timing, &[profile], &rows, Solver::Exact, false, &mut |block| {
         run.append(block);
         Flow::Continue

@@ -71,7 +71,7 @@ fn drawn(chance: &mut Chance, free: &[&str], off: f64) -> Case {
     let mut case = Case::from_text_with("axis.toml", TEMPLATE, &changes).unwrap();
     let noise = 1e-3 * 10f64.powf(chance.uniform());
     for (own, other) in case.experiments.iter_mut().zip(&truth.experiments) {
-        let run = simulate(&truth.machine, other, Solver::of(&truth.machine)).unwrap().trajectory;
+        let run = simulate(&truth.machine, other, Solver::for_machine(&truth.machine)).unwrap().trajectory;
         let angle = run.get("drive_angle").unwrap().iter();
         own.log = Some(logged(&other.name, &run, angle.map(|v| v + noise * chance.normal()).collect()));
     }
@@ -155,7 +155,7 @@ fn of_machines_that_are_alike_the_nearest_is_written() {
             own.set(&mut case.machine, own.start * 2f64.powf(2.0 * chance.uniform() - 1.0));
         }
         for (own, other) in case.experiments.iter_mut().zip(&truth.experiments) {
-            let run = simulate(&truth.machine, other, Solver::of(&truth.machine)).unwrap().trajectory;
+            let run = simulate(&truth.machine, other, Solver::for_machine(&truth.machine)).unwrap().trajectory;
             let angle = run.get("drive_angle").unwrap().iter();
             own.log = Some(logged(&other.name, &run, angle.map(|v| v + 1e-3 * chance.normal()).collect()));
         }

@@ -49,7 +49,7 @@ fn moved<const N: usize>(case: &Case, truth: &Case, name: &str, columns: [&str; 
     let motion = case.moves.iter().find(|one| one.name == name).unwrap();
     let mut controllers = Standard::of_drives(design, &case.machine).unwrap();
     let mut each: Vec<&mut dyn Controller> = controllers.iter_mut().map(|one| one as &mut dyn Controller).collect();
-    let (timing, profiles) = (Loop::of(design), motion.references(design));
+    let (timing, profiles) = (Loop::new(design), motion.references(design));
     let rows = Rows { until: motion.until, every: design.every, window: motion.window };
     let mut all = [const { Vec::new() }; N];
     let mut sink = |block: &taut::trajectory::Trajectory| {
@@ -59,7 +59,7 @@ fn moved<const N: usize>(case: &Case, truth: &Case, name: &str, columns: [&str; 
         }
         Flow::Continue
     };
-    let solver = Solver::of(&truth.machine);
+    let solver = Solver::for_machine(&truth.machine);
     stream(&truth.machine, &mut each, &timing, &profiles, &rows, solver, false, &mut sink).unwrap();
     all
 }

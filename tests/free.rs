@@ -15,7 +15,7 @@ fn made(own: &[&str], key: &str, truth: f64, noise: f64) -> Case {
     let mut chance = Chance::new(7);
     case.experiments.remove(0);
     let experiment = &real.experiments[1];
-    let run = simulate(&real.machine, experiment, Solver::of(&real.machine)).unwrap().trajectory;
+    let run = simulate(&real.machine, experiment, Solver::for_machine(&real.machine)).unwrap().trajectory;
     let angle = run.get("drive_angle").unwrap();
     let values = angle.iter().map(|v| v + noise * chance.normal()).collect();
     let name = case.experiments[0].name.clone();

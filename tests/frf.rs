@@ -20,7 +20,7 @@ fn stage() -> Machine {
 }
 
 fn model(stage: &Machine, delay: f64) -> (Discrete, usize) {
-    let system = StateSpace::of(stage, Operation::default()).unwrap();
+    let system = StateSpace::new(stage, Operation::default()).unwrap();
     let output = system.output("drive_angle").unwrap();
     (system.discrete(EVERY, Hold::Zero, delay).unwrap(), output)
 }
@@ -172,7 +172,7 @@ fn stiffness_damping_and_delay() {
 fn a_straight_input_is_modelled_as_such() {
     let mut machine = stage();
     machine.belt.stiffness = machine.belt.stiffness.map(|k| 1.2 * k);
-    let system = StateSpace::of(&machine, Operation::default()).unwrap();
+    let system = StateSpace::new(&machine, Operation::default()).unwrap();
     let discrete = system.discrete(EVERY, Hold::First, 0.0).unwrap();
     let output = system.output("drive_angle").unwrap();
     let (input, samples) = (white(60_000, 3.0), 60_000);
@@ -219,7 +219,7 @@ fn a_delay_that_the_log_lacks_counts_in_margins() {
         case.controller.as_mut().unwrap().delay = 0.5e-3;
         case.experiments[0].log = Some(Arc::new(log));
         let cut = Cut { segment: Some(1.024), period: None };
-        let found = measure(&case, &cut, Known::of(&case, None, None, None).unwrap()).unwrap();
+        let found = measure(&case, &cut, Known::new(&case, None, None, None).unwrap()).unwrap();
         found.responses[0].margins.expect("the encoder's own angle")
     };
     let [without, with] = [0.0, 0.5e-3].map(margins);

@@ -80,7 +80,7 @@ fn the_general_solver_agrees_with_the_authority() {
 
 /// The figures of a run with a row every so many seconds, and the rows.
 fn metered(case: &Case, solver: Solver, every: f64) -> (Metrics, Trajectory) {
-    let course = Course { every, ..Course::of(&case.machine.mechanism(), &case.experiments[0]) };
+    let course = Course { every, ..Course::new(&case.machine.mechanism(), &case.experiments[0]) };
     let mut meter = Meter::new(&case.machine, &case.experiments[0]);
     let mut rows = Trajectory::default();
     let sink = &mut |block: &Trajectory| {
@@ -184,7 +184,7 @@ fn the_error_of_the_general_solver_is_estimated() {
     let case = Case::from_text_with("follows.toml", &text, &[]).unwrap();
     let mechanism = case.machine.mechanism();
     assert_eq!(Solver::of_mechanism(&mechanism), Solver::GENERAL);
-    let course = Course::of(&mechanism, &case.experiments[0]);
+    let course = Course::new(&mechanism, &case.experiments[0]);
     let go = |tolerance: f64, sink: &mut dyn FnMut(&Trajectory) -> Flow| {
         stream_mechanism(&mechanism, &course, Solver::General { tolerance }, (Detail::Full, None), sink).unwrap()
     };
@@ -218,7 +218,7 @@ fn elastic_modes_are_those_of_the_authority() {
     assert_eq!(told.len(), 23);
     for told in told {
         let case = Case::from_text_with("gantry.toml", told["case"].as_str().unwrap(), &[]).unwrap();
-        let analysis = Analysis::of(&case, &Question::default()).unwrap();
+        let analysis = Analysis::new(&case, &Question::default()).unwrap();
         let (name, modes) = (told["name"].as_str().unwrap(), analysis.modes.unwrap());
         let want: Vec<f64> = told["elastic_Hz"].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect();
         assert_eq!((modes.rigid.len(), modes.elastic.len()), (2, want.len()), "{name}");
@@ -252,7 +252,7 @@ fn the_machines_of_the_note() {
         ("core-xy", "[150e3, 90e3, 140e3, 95e3]", [214.360612188, 263.042776685]),
     ] {
         let case = case(kind, stiffness);
-        let analysis = Analysis::of(&case, &Question::default()).unwrap();
+        let analysis = Analysis::new(&case, &Question::default()).unwrap();
         let modes = analysis.modes.unwrap();
         for (mode, want) in modes.elastic.iter().zip(hertz) {
             assert!((mode.hertz() - want).abs() < 1e-9, "{kind}: {} Hz", mode.hertz());
@@ -284,7 +284,7 @@ fn a_dual_belt_swings_as_its_masses_do() {
     let mut squares: Vec<f64> =
         vec![side / pulley, side / pulley + 2.0 * side / whole, along * (1.0 / pulley + 1.0 / cart)];
     squares.sort_by(f64::total_cmp);
-    let modes = Analysis::of(&case, &Question::default()).unwrap().modes.unwrap();
+    let modes = Analysis::new(&case, &Question::default()).unwrap().modes.unwrap();
     assert_eq!((modes.rigid.len(), modes.elastic.len()), (2, 3));
     for (mode, square) in modes.elastic.iter().zip(squares) {
         let want = square.sqrt() / (2.0 * std::f64::consts::PI);
@@ -309,7 +309,7 @@ fn a_swing_of_a_gantry_dies_out_with_its_damping_ratio() {
         experiment = [{ name = "run", input = {}, until = 0.05, every = 1e-5 }]
     "#;
     let mut case = Case::from_text_with("gantry.toml", text, &[]).unwrap();
-    let modes = Natural::of(&case.machine.mechanism(), &[0.0; 6]).unwrap();
+    let modes = Natural::new(&case.machine.mechanism(), &[0.0; 6]).unwrap();
     let last = modes.elastic.last().unwrap();
     let Some(Root::Pair { frequency, damping }) = last.damped else { panic!("{modes:?}") };
     assert!((frequency / last.frequency - 1.0).abs() < 0.05 && damping > 0.01 && damping < 0.5);
@@ -337,7 +337,7 @@ fn a_swing_of_a_gantry_dies_out_with_its_damping_ratio() {
 fn resonances_follow_bridge_and_cart() {
     for name in ["h-frame", "core-xy", "dual-belt"] {
         let case = Case::read_with(format!("stages/{name}/follows.toml"), &[]).unwrap();
-        let analysis = Analysis::of(&case, &Question::default()).unwrap();
+        let analysis = Analysis::new(&case, &Question::default()).unwrap();
         let map = analysis.map.unwrap();
         let middle = (map.bridge.len() / 2, map.cart.len() / 2);
         assert!(map.bridge[middle.0].abs() < 1e-15 && map.cart[middle.1].abs() < 1e-15);

@@ -44,7 +44,7 @@ fn logged(run: &Trajectory, kind: MachineKind, positions: Option<f64>, seed: u64
     let is_counted = |quantity: &&Quantity| {
         geometry.drives.iter().any(|drive| quantity.name() == format!("{}_angle", geometry.label(drive.pulley).key))
     };
-    let mut outputs: Vec<Output> = Quantity::of(kind)
+    let mut outputs: Vec<Output> = Quantity::for_kind(kind)
         .iter()
         .filter(is_counted)
         .map(|&quantity| {

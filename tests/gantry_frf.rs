@@ -65,7 +65,7 @@ fn simulated(machine: &Machine, volts: &[f64], noise: &[f64], until: f64) -> Log
     let mut endless = machine.clone();
     endless.cart.travel = None;
     endless.bridge.iter_mut().for_each(|bridge| bridge.travel = None);
-    let run = simulate(&endless, &case.experiments[0], Solver::of(machine)).unwrap().trajectory;
+    let run = simulate(&endless, &case.experiments[0], Solver::for_machine(machine)).unwrap().trajectory;
     // Once everything slides.
     let column = |name: &str| run.get(name).unwrap()[1000..].to_vec();
     let mut chance = Chance::new(4);
@@ -85,19 +85,19 @@ fn simulated(machine: &Machine, volts: &[f64], noise: &[f64], until: f64) -> Log
 
 /// The sampled model of each input.
 fn models(machine: &Machine) -> Vec<Discrete> {
-    let system = System::of(machine, Operation::default()).unwrap();
+    let system = System::new(machine, Operation::default()).unwrap();
     (0..machine.drives.len()).map(|drive| system.input(drive).discrete(EVERY, Hold::Zero, 0.0).unwrap()).collect()
 }
 
 fn truth(machine: &Machine, models: &[Discrete], frf: &Frf) -> Vec<Complex<f64>> {
-    let output = System::of(machine, Operation::default()).unwrap().input(0).output(frf.quantity.name()).unwrap();
+    let output = System::new(machine, Operation::default()).unwrap().input(0).output(frf.quantity.name()).unwrap();
     frf.points.iter().map(|point| models[frf.drive].at(point.omega)[output]).collect()
 }
 
 /// A log of the sampled model, without noise.
 fn made(name: &str, machine: &Machine, inputs: Vec<Vec<f64>>) -> Log {
     let samples = inputs[0].len();
-    let system = System::of(machine, Operation::default()).unwrap().input(0);
+    let system = System::new(machine, Operation::default()).unwrap().input(0);
     let quantities = quantities(machine);
     let mut outputs: Vec<(Quantity, Vec<f64>)> = quantities.iter().map(|q| (*q, vec![0.0; samples])).collect();
     for (model, input) in models(machine).iter().zip(&inputs) {
@@ -281,7 +281,7 @@ fn measured_margins_of_both_loops() {
     let mut experiment = Case::read("stages/core-xy/belts.toml").unwrap().experiments.remove(0);
     experiment.log = Some(log.into());
     case.experiments = vec![experiment];
-    let known = Known::of(&case, None, None, None).unwrap();
+    let known = Known::new(&case, None, None, None).unwrap();
     let found = measure(&case, &Cut { segment: Some(2.048), period: None }, known).unwrap();
     let design = case.controller.clone().unwrap();
     let plant = Plant::of(&case.machine, Operation::default(), &design, &[]).unwrap();
@@ -302,11 +302,11 @@ fn measured_margins_of_both_loops() {
 fn a_place_that_is_none_is_refused() {
     let gantry = Case::read("stages/core-xy/belts.toml").unwrap();
     let axis = Case::read("stages/sollmann-jouaneh/table4.toml").unwrap();
-    let told = Known::of(&axis, None, Some(0.1), None).unwrap_err().to_string();
+    let told = Known::new(&axis, None, Some(0.1), None).unwrap_err().to_string();
     assert!(told.contains("this machine has no bridge"), "{told}");
-    assert!(Known::of(&gantry, Some(0.1), Some(-0.2), None).is_ok());
+    assert!(Known::new(&gantry, Some(0.1), Some(-0.2), None).is_ok());
     let stage = Case::read("stages/core-xy/core-xy.toml").unwrap();
-    let told = Known::of(&stage, None, Some(1.0), None).unwrap_err().to_string();
+    let told = Known::new(&stage, None, Some(1.0), None).unwrap_err().to_string();
     assert!(told.contains("outside the travel"), "{told}");
     let told = measure(&stage, &Cut::default(), AT_HOME).unwrap_err();
     assert!(told.next.unwrap().contains("left_input = \"u1\", right_input"));

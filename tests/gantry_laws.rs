@@ -170,7 +170,7 @@ proptest! {
         if let Some(bridge) = &mut gantry.bridge {
             bridge.friction = smooth(bridge.friction);
         }
-        let system = System::of(&gantry, Operation::default()).unwrap();
+        let system = System::new(&gantry, Operation::default()).unwrap();
         prop_assert_eq!(system.inputs.iter().map(|input| input.name.as_str()).collect::<Vec<_>>(),
             ["left_voltage_command", "right_voltage_command", "cart_voltage_command"][..volts.len()].to_vec());
         let (until, n) = (0.02, system.a.nrows());
@@ -194,9 +194,9 @@ proptest! {
         }
         // Poles: without an inductance those of M, C and K.
         if gantry.drives[0].motor.inductance == 0.0 {
-            let natural = Natural::of(&mechanism, &[0.0; 6]).unwrap();
+            let natural = Natural::new(&mechanism, &[0.0; 6]).unwrap();
             let fast = |roots: Vec<Root>| roots.into_iter().filter_map(Root::hertz).collect::<Vec<_>>();
-            let (a, b) = (fast(Root::of(&system.input(0).poles().unwrap())), fast(natural.poles));
+            let (a, b) = (fast(Root::from_values(&system.input(0).poles().unwrap())), fast(natural.poles));
             prop_assert_eq!(a.len(), b.len());
             for (a, b) in a.iter().zip(&b) {
                 prop_assert!((a - b).abs() <= 1e-9 * b, "{a} Hz and {b} Hz");

@@ -65,9 +65,9 @@ struct Sampled {
 }
 
 impl Sampled {
-    fn of(case: &Case) -> Self {
+    fn new(case: &Case) -> Self {
         let design = case.controller.as_ref().unwrap();
-        let system = System::of(&case.machine, Operation::default()).unwrap();
+        let system = System::new(&case.machine, Operation::default()).unwrap();
         let (n, drives) = (system.a.nrows(), case.machine.drives.len());
         let held = |time: f64| {
             let mut whole = DMatrix::zeros(n + drives, n + drives);
@@ -153,7 +153,7 @@ fn margins_are_those_of_matrices_on_a_dense_grid() {
             continue;
         }
         stable += 1;
-        let sampled = Sampled::of(&case);
+        let sampled = Sampled::new(&case);
         let most = PI / design.every;
         let mut grid: Vec<f64> = (1..4000).map(|k| most * 10f64.powf(-4.0 * (1.0 - f64::from(k) / 4000.0))).collect();
         grid.extend([margins.at, margins.complementary_at]);
@@ -228,7 +228,7 @@ fn a_drive_swings_beyond_its_gain_margin() {
             let mut louder: Vec<Louder> = both.into_iter().zip(gains).map(|(one, gain)| of_drive(one, gain)).collect();
             let mut each: Vec<&mut dyn Controller> = louder.iter_mut().map(|one| one as &mut dyn Controller).collect();
             let profiles = &case.moves[0].profiles;
-            let timing = Loop::of(design);
+            let timing = Loop::new(design);
             let run = close(&case.machine, &mut each, &timing, profiles, 12.0, 1e-4, Solver::Exact).unwrap();
             run.outcome.ending == Ending::Complete && run.figures.settling.is_some_and(|time| time < 9.0)
         };
@@ -287,7 +287,7 @@ fn largest_error(number: u64, structure: &str, feed_forward: &str) -> f64 {
     let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
     let mut all = Standard::of_drives(design, &case.machine).unwrap();
     let mut controllers: Vec<&mut dyn Controller> = all.iter_mut().map(|one| one as &mut dyn Controller).collect();
-    let timing = Loop::of(design);
+    let timing = Loop::new(design);
     let profiles = &motion.profiles;
     let run = close(&case.machine, &mut controllers, &timing, profiles, motion.until, motion.window, Solver::Exact);
     let run = run.unwrap();

@@ -285,14 +285,14 @@ fn moved(case: &Case, motion: &Move, every: f64) -> (MoveRun, Trajectory) {
     let design = case.controller.as_ref().unwrap();
     let mut controllers = Standard::of_drives(design, &case.machine).unwrap();
     let rows = Rows { until: motion.until, every, window: motion.window };
-    let (references, solver) = (motion.references(design), Solver::of(&case.machine));
+    let (references, solver) = (motion.references(design), Solver::for_machine(&case.machine));
     let mut trajectory = Trajectory::default();
     let sink = &mut |block: &Trajectory| {
         trajectory.append(block);
         Flow::Continue
     };
     let controllers = &mut each(&mut controllers);
-    let run = stream(&case.machine, controllers, &Loop::of(design), &references, &rows, solver, false, sink).unwrap();
+    let run = stream(&case.machine, controllers, &Loop::new(design), &references, &rows, solver, false, sink).unwrap();
     (run, trajectory)
 }
 

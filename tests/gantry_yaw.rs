@@ -69,7 +69,7 @@ struct Plain {
 }
 
 impl Plain {
-    fn of(case: Case) -> Self {
+    fn new(case: Case) -> Self {
         let pulleys = case.machine.drives.len();
         let volts = [5.0, 2.0, -3.0][..pulleys].to_vec();
         Self { case, volts, pulleys, is_held: false }
@@ -219,9 +219,9 @@ fn runs_are_those_of_lagranges_equations_within_the_stated_error() {
         let mut case = case(kind, (SOFT, 1.0), ("", ""));
         // The ends of the bridge begin up to half a millimetre from where the belts are without strain.
         case.experiments[0].initial.position[case.machine.yaw_body().unwrap()] = 2e-3;
-        let plain = Plain::of(case);
+        let plain = Plain::new(case);
         let (machine, experiment) = (&plain.case.machine, &plain.case.experiments[0]);
-        assert_eq!(Solver::of(machine), Solver::GENERAL);
+        assert_eq!(Solver::for_machine(machine), Solver::GENERAL);
         let run = common::complete(&plain.case, Solver::GENERAL);
         let mut estimate = ErrorEstimate::new(machine, experiment);
         estimate.take(&run.trajectory);
@@ -307,7 +307,7 @@ fn friction_of_a_bridge_at_rest_holds_what_the_cart_does_to_it() {
     let (mut by_the_cart, mut stuck, mut loads) = (0.0_f64, 0, Vec::new());
     for (kind, yaw) in KINDS.into_iter().flat_map(|kind| [1e-5, 5e-5, 3e-4, 1e-3, 3e-3].map(|yaw| (kind, yaw))) {
         let dry = ", coulomb = \"1 N\", static = \"1.5 N\"";
-        let mut plain = Plain::of(plucked(kind, yaw, dry));
+        let mut plain = Plain::new(plucked(kind, yaw, dry));
         plain.is_held = true;
         let (p, run) = (plain.pulleys, common::complete(&plain.case, Solver::General { tolerance: 1e-11 }));
         let column = |name: &str| run.trajectory.get(name).unwrap();
@@ -337,12 +337,12 @@ fn friction_of_a_bridge_at_rest_holds_what_the_cart_does_to_it() {
 #[test]
 fn modes_are_those_of_the_mass_matrix_at_the_cart() {
     for kind in KINDS {
-        let plain = Plain::of(plucked(kind, 0.0, ""));
+        let plain = Plain::new(plucked(kind, 0.0, ""));
         let (machine, p, y) = (&plain.case.machine, plain.pulleys, 0.2);
         let mechanism = machine.mechanism();
         let n = p + 3;
         let at = machine.without_strain(&[0.0, y], &[]).position;
-        let modes = Natural::of(&mechanism, &at).unwrap();
+        let modes = Natural::new(&mechanism, &at).unwrap();
         assert_eq!((modes.rigid.len(), modes.elastic.len()), (2, n - 2), "{kind}");
         let (bridge, cart, inertia) =
             (machine.bridge.as_ref().unwrap().mass, machine.cart.mass, machine.yaw.unwrap().inertia);
@@ -361,14 +361,14 @@ fn modes_are_those_of_the_mass_matrix_at_the_cart() {
             assert!((mode.energy.iter().sum::<f64>() - 1.0).abs() < 1e-9, "{kind}: {:?}", mode.energy);
         }
         // The linear equations have the same frequencies as poles.
-        let poles = System::of(machine, Operation::at(&[0.0, y])).unwrap().input(0).poles().unwrap();
+        let poles = System::new(machine, Operation::at(&[0.0, y])).unwrap().input(0).poles().unwrap();
         for mode in &modes.elastic {
             let near =
                 poles.iter().map(|pole| (pole.norm() / mode.frequency - 1.0).abs()).fold(f64::INFINITY, f64::min);
             assert!(near < 1e-9, "{kind}: no pole at {} rad/s", mode.frequency);
         }
         // They are others with the cart in the middle.
-        let middle = Natural::of(&mechanism, &[0.0; 6]).unwrap();
+        let middle = Natural::new(&mechanism, &[0.0; 6]).unwrap();
         let moved = modes.elastic.iter().zip(&middle.elastic).map(|(a, b)| (a.frequency / b.frequency - 1.0).abs());
         assert!(moved.fold(0.0, f64::max) > 0.05, "{kind}");
         assert!(modes.poles.iter().filter(|root| matches!(root, Root::Pair { .. })).count() == n - 2);
@@ -380,7 +380,7 @@ fn position_errors_and_stretches_contain_the_yaw() {
     for kind in KINDS {
         let mut case = case(kind, (SOFT, 1.0), ("", ""));
         case.experiments[0].every = 2e-5;
-        let plain = Plain::of(case);
+        let plain = Plain::new(case);
         let (machine, experiment) = (&plain.case.machine, &plain.case.experiments[0]);
         let mut meter = Meter::new(machine, experiment);
         let rows_of = &mut |_: &taut::trajectory::Trajectory| Flow::Continue;

@@ -352,8 +352,8 @@ fn the_exact_solver_says_what_it_cannot_take() {
     };
     assert!(refused(&stage_of(LAWS[0])).starts_with("the friction law of the drive pulley is not linear"));
     assert!(refused(&following(Law::Coulomb)).starts_with("the belt's spans follow the cart"));
-    assert_eq!(Solver::of(&stage_of(LAWS[3])), Solver::GENERAL);
-    assert_eq!(Solver::of(&common::table4()), Solver::Exact);
+    assert_eq!(Solver::for_machine(&stage_of(LAWS[3])), Solver::GENERAL);
+    assert_eq!(Solver::for_machine(&common::table4()), Solver::Exact);
 }
 
 /// Equations for another integrator counted no events: one that changed an input again and again filled the memory of

@@ -33,7 +33,7 @@ fn lines(path: &str) -> String {
             rows.append(block);
             Flow::Continue
         };
-        stream(&case.machine, experiment, Solver::of(&case.machine), &mut take).unwrap();
+        stream(&case.machine, experiment, Solver::for_machine(&case.machine), &mut take).unwrap();
         told(&experiment.name, &rows);
     }
     text

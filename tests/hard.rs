@@ -275,7 +275,7 @@ struct Rigid {
 }
 
 impl Rigid {
-    fn of(machine: &Machine) -> Self {
+    fn new(machine: &Machine) -> Self {
         let r = machine.pulley_radius;
         let motor = &machine.drives[0].motor;
         let brake = motor.torque_constant * motor.back_emf_constant / motor.resistance;
@@ -315,7 +315,7 @@ fn a_stiff_belt_is_rigid() {
         // Damped, so that no swing is left to stop on.
         let damping = 2.0 * 0.3 * (decade * 0.1_f64).sqrt();
         machine.belt.damping = [damping; 3].into();
-        let rigid = Rigid::of(&machine);
+        let rigid = Rigid::new(&machine);
         let solution = complete(&machine, &experiment(pulse(5.0), 0.6));
         let force = load_at(&machine, 5.0) / machine.pulley_radius;
         let want = rigid.pulse(force, 0.25);

@@ -77,7 +77,7 @@ proptest! {
         };
         let power = |row: usize| {
             let codes = LABELS.map(|b| trajectory.get(&format!("{}_state", b.key)).unwrap()[row]);
-            let mode = |positive| Mode::of(codes.map(motion)).with_torque(positive);
+            let mode = |positive| Mode::new(codes.map(motion)).with_torque(positive);
             let state = state(trajectory, row);
             // The sign of the gear's torque is the one that is consistent with itself.
             let both = [true, false].map(|positive| mechanism.power(mode(positive), &state, &[input_at(row), 0.0, 0.0]));
@@ -146,7 +146,7 @@ proptest! {
                 AmplifierMode::Current => (limit(voltage, amplifier.voltage_limit), commanded(amplifier.current_limit)),
                 AmplifierMode::Position => unreachable!("no stepper is drawn"),
             };
-            let mut mode = Mode::of(LABELS.map(|b| motion(at(&format!("{}_state", b.key)).unwrap())));
+            let mut mode = Mode::new(LABELS.map(|b| motion(at(&format!("{}_state", b.key)).unwrap())));
             for (span, slack) in mode.slack.iter_mut().enumerate().take(SPANS) {
                 *slack = at(&format!("span{}_slack", span + 1)) == Some(1.0);
             }

@@ -34,7 +34,7 @@ fn repeated(case: &Case, truth: &Case, at: At, added: Option<&[Added]>) -> Trial
     let mut fed: Vec<Fed> =
         controllers.into_iter().zip(added.unwrap_or(&none)).map(|(own, added)| Fed::new(own, added)).collect();
     let mut each: Vec<&mut dyn Controller> = fed.iter_mut().map(|fed| fed as &mut dyn Controller).collect();
-    let (timing, profiles) = (Loop::of(design), motion.references(design));
+    let (timing, profiles) = (Loop::new(design), motion.references(design));
     let rows = Rows { until: motion.until, every: design.every, window: motion.window };
     let name = |body: usize| geometry.label(body).key;
     let columns: Vec<(String, f64)> = match at {
@@ -49,7 +49,7 @@ fn repeated(case: &Case, truth: &Case, at: At, added: Option<&[Added]>) -> Trial
         }
         Flow::Continue
     };
-    let solver = Solver::of(&truth.machine);
+    let solver = Solver::for_machine(&truth.machine);
     stream(&truth.machine, &mut each, &timing, &profiles, &rows, solver, false, &mut sink).unwrap();
     trial
 }

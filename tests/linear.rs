@@ -55,7 +55,7 @@ fn two_hundred_random_stages() {
         let number = |key: &str| case[key].as_f64().unwrap();
         let machine = Case::from_text("case.toml", case["case"].as_str().unwrap()).unwrap().machine;
         let operation = Operation { speed: number("speed"), ..Operation::default() };
-        let system = StateSpace::of(&machine, operation).unwrap();
+        let system = StateSpace::new(&machine, operation).unwrap();
         let sampled = system.discrete(number("sample_time"), Hold::Zero, 0.0).unwrap();
         // Index, our distance to 60 digits, to python-control, and how far that is from the 60 digits.
         let mut check = |index: usize, what: &str, exact: f64, control: f64, doubt: &str| {
@@ -116,7 +116,7 @@ fn two_hundred_random_stages() {
 
 /// Hertz of every pair, the lowest first.
 fn hertz(system: &StateSpace) -> Vec<f64> {
-    Root::of(&system.poles().unwrap()).into_iter().filter_map(Root::hertz).collect()
+    Root::from_values(&system.poles().unwrap()).into_iter().filter_map(Root::hertz).collect()
 }
 
 proptest! {
@@ -127,7 +127,7 @@ proptest! {
     fn poles_of_a_passive_stage_do_not_grow(mut machine in equipped(Dry::Any)) {
         machine.drives[0].motor.back_emf_constant = machine.drives[0].motor.torque_constant;
         for operation in [Operation::default(), Operation { speed: -0.1, ..Operation::default() }] {
-            let poles = StateSpace::of(&machine, operation).unwrap().poles().unwrap();
+            let poles = StateSpace::new(&machine, operation).unwrap().poles().unwrap();
             let largest = poles.iter().map(|p| p.norm()).fold(0.0, f64::max);
             prop_assert!(poles.iter().all(|p| p.re <= 1e-12 * largest), "{poles:?}");
         }
@@ -136,9 +136,9 @@ proptest! {
     /// An output that is the drive angle stands still where everything else swings with the drive pulley clamped.
     #[test]
     fn antiresonance_is_resonance_with_the_drive_pulley_clamped(machine in machine(Dry::Any)) {
-        let free = StateSpace::of(&machine, Operation::default()).unwrap();
+        let free = StateSpace::new(&machine, Operation::default()).unwrap();
         let held = Operation { held: [true, false, false, false, false, false], ..Operation::default() };
-        let held = StateSpace::of(&machine, held).unwrap().poles().unwrap();
+        let held = StateSpace::new(&machine, held).unwrap().poles().unwrap();
         let zeros = free.zeros(free.output("drive_angle").unwrap()).unwrap().unwrap().values;
         // With an inductance the current goes on by itself while the pulley is held: −R/L, no zero.
         let electrical = Complex::new(-machine.drives[0].motor.resistance / machine.drives[0].motor.inductance, 0.0);
@@ -149,7 +149,7 @@ proptest! {
     /// Poles and zeros together are the transfer function.
     #[test]
     fn the_response_is_that_of_its_poles_and_zeros(machine in equipped(Dry::Any)) {
-        let system = StateSpace::of(&machine, Operation::default()).unwrap();
+        let system = StateSpace::new(&machine, Operation::default()).unwrap();
         let transfers = system.transfers().unwrap();
         for omega in [3.0, 40.0, 700.0, 2e4] {
             for (got, transfer) in system.at(omega).into_iter().zip(&transfers) {
@@ -175,7 +175,7 @@ proptest! {
         }
         machine.drives[0].motor.gear_efficiency = 1.0;
         let (period, late) = (1e-3, (late * 4.0).round() / 4.0);
-        let system = StateSpace::of(&machine, Operation::default()).unwrap();
+        let system = StateSpace::new(&machine, Operation::default()).unwrap();
         let model = system.discrete(period, Hold::Zero, late * period).unwrap();
         let run = experiment(Signal::Pulse { value: 3.0, duration: 5.0 * period, at: late * period }, 0.02);
         let trajectory = simulate(&machine, &run, Solver::Exact).unwrap().trajectory;
@@ -196,7 +196,7 @@ proptest! {
 #[test]
 fn the_response_is_what_a_run_shows() {
     for (machine, hertz) in [(table4(), 20.0), (table4(), 130.0), (table2(), 300.0), (table1(), 60.0)] {
-        let system = StateSpace::of(&machine, Operation::default()).unwrap();
+        let system = StateSpace::new(&machine, Operation::default()).unwrap();
         let mut run = experiment(Signal::Sine { amplitude: 0.2, frequency: hertz, phase: 0.0, offset: 4.0 }, 3.0);
         run.every = 1.0 / (40.0 * hertz);
         let trajectory = simulate(&machine, &run, Solver::Exact).unwrap().trajectory;
@@ -225,7 +225,7 @@ fn bristles_slide_like_the_curve_and_hold_like_a_spring() {
     let bristles = with(Law::LuGre { stiffness: 1e5, damping: 30.0, velocity: 0.1 });
     let curve = with(Law::Stribeck { velocity: 0.1, shape: Shape::Gaussian });
     let gain = |machine: &Machine, speed: f64| {
-        let system = StateSpace::of(machine, Operation { speed, ..Operation::default() }).unwrap();
+        let system = StateSpace::new(machine, Operation { speed, ..Operation::default() }).unwrap();
         system.transfers().unwrap()[system.output("cart_speed").unwrap()].low_frequency()
     };
     for speed in [0.02, 0.1, -0.3] {
@@ -234,7 +234,7 @@ fn bristles_slide_like_the_curve_and_hold_like_a_spring() {
     }
     let rest = Operation { speed: 0.0, held: [true, false, true, false, false, false], ..Operation::default() };
     let [k1, k2, _] = bristles.belt.stiffness.three();
-    let swing = StateSpace::of(&bristles, rest).unwrap().poles().unwrap().pop().unwrap().norm_sqr();
+    let swing = StateSpace::new(&bristles, rest).unwrap().poles().unwrap().pop().unwrap().norm_sqr();
     assert!((swing / ((k1 + k2 + 1e5) / bristles.cart.mass) - 1.0).abs() < 1e-12, "{swing}");
 }
 
@@ -268,21 +268,21 @@ fn spans_that_follow_the_cart() {
     assert!(along[4].undamped_antiresonances[1] > 2.0 * along[2].undamped_antiresonances[1], "{along:?}");
     // Where the axis is built symmetric it is so for the anti-resonance with both pulleys held.
     let both = Operation { held: [true, false, true, false, false, false], ..Operation::default() };
-    let at = |position| hertz(&StateSpace::of(&machine, Operation { position, ..both }).unwrap());
+    let at = |position| hertz(&StateSpace::new(&machine, Operation { position, ..both }).unwrap());
     assert!((at(0.2)[0] / at(-0.2)[0] - 1.0).abs() < 1e-12);
     let [k1, k2] = make.stiffness_at(0.2);
-    let poles = StateSpace::of(&machine, Operation { position: 0.2, ..both }).unwrap().poles().unwrap();
+    let poles = StateSpace::new(&machine, Operation { position: 0.2, ..both }).unwrap().poles().unwrap();
     assert!((poles[0].norm_sqr() / ((k1 + k2) / machine.cart.mass) - 1.0).abs() < 1e-12);
-    let beyond = StateSpace::of(&machine, Operation { position: 0.41, ..Operation::default() });
+    let beyond = StateSpace::new(&machine, Operation { position: 0.41, ..Operation::default() });
     assert!(beyond.unwrap_err().to_string().contains("between -0.4 m and 0.4 m"));
 }
 
 #[test]
 fn phases_run_on_from_where_they_begin() {
-    let system = StateSpace::of(&table2(), Operation::default()).unwrap();
+    let system = StateSpace::new(&table2(), Operation::default()).unwrap();
     let transfers = system.transfers().unwrap();
     let zeros: Vec<_> = transfers.iter().map(|t| t.zeros.clone()).collect();
-    let range = Range::of(&transfers[0].poles, &zeros);
+    let range = Range::new(&transfers[0].poles, &zeros);
     let frequencies = range.frequencies(&transfers[0].poles);
     let responses = system.responses(&transfers, &frequencies);
     let of = |name: &str| &responses[system.output(name).unwrap()];
@@ -301,7 +301,7 @@ fn phases_run_on_from_where_they_begin() {
 /// Of an undamped stage nothing is left over: the eigenvalues lie on the axis.
 #[test]
 fn stages_without_losses() {
-    let poles = StateSpace::of(&undamped(&table4()), Operation::default()).unwrap().poles().unwrap();
+    let poles = StateSpace::new(&undamped(&table4()), Operation::default()).unwrap().poles().unwrap();
     assert_eq!(poles.iter().filter(|p| p.norm() == 0.0).count(), 2);
     assert!(poles.iter().all(|p| p.re.abs() <= 1e-12 * p.norm()), "{poles:?}");
 }
@@ -310,7 +310,7 @@ fn stages_without_losses() {
 #[test]
 fn nothing_is_left_to_move() {
     let held = Operation { held: [true, true, true, false, false, false], ..Operation::default() };
-    let system = StateSpace::of(&table4(), held).unwrap();
+    let system = StateSpace::new(&table4(), held).unwrap();
     assert_eq!((system.states.len(), system.poles().unwrap().len()), (0, 0));
     let transfers = system.transfers().unwrap();
     let current = system.output("motor_current").unwrap();
@@ -321,7 +321,7 @@ fn nothing_is_left_to_move() {
 
 #[test]
 fn what_cannot_be_sampled_is_said() {
-    let system = StateSpace::of(&table2(), Operation::default()).unwrap();
+    let system = StateSpace::new(&table2(), Operation::default()).unwrap();
     for (t, hold, delay) in
         [(0.0, Hold::Zero, 0.0), (f64::NAN, Hold::Zero, 0.0), (1e-3, Hold::Tustin, 1e-4), (1e-3, Hold::Zero, 1.0)]
     {
@@ -340,7 +340,7 @@ fn what_cannot_be_sampled_is_said() {
 /// A delay that rounding does not tell from none made a model with no place for it: an index past the end.
 #[test]
 fn a_delay_below_rounding_is_none() {
-    let system = StateSpace::of(&table2(), Operation::default()).unwrap();
+    let system = StateSpace::new(&table2(), Operation::default()).unwrap();
     let none = system.discrete(1e-3, Hold::Zero, 0.0).unwrap();
     for delay in [5e-324, 1e-300, 1e-20, 1e-16] {
         let model = system.discrete(1e-3, Hold::Zero, delay).unwrap();
@@ -355,7 +355,7 @@ fn a_delay_below_rounding_is_none() {
 fn a_question_whose_numbers_are_none_is_refused() {
     use taut::linear::{Analysis, Question};
     let case = taut::case::Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap();
-    let told = |question: Question| Analysis::of(&case, &question).unwrap_err().to_string();
+    let told = |question: Question| Analysis::new(&case, &question).unwrap_err().to_string();
     let nan = f64::NAN;
     let usual = Question::default();
     for (question, expected) in [
@@ -390,23 +390,23 @@ fn natural_modes_have_the_poles_of_the_state_space() {
     geared.drives[0].motor.rotor_inertia = 4e-6;
     geared.belt.damping = [3.0, 4.0, 5.0].into();
     for machine in [table4(), geared] {
-        let natural = Natural::of(&machine.mechanism(), &[0.0; 6]).unwrap();
-        let system = StateSpace::of(&machine, Operation::default()).unwrap();
+        let natural = Natural::new(&machine.mechanism(), &[0.0; 6]).unwrap();
+        let system = StateSpace::new(&machine, Operation::default()).unwrap();
         let size = |root: &Root| match *root {
             Root::Zero => 0.0,
             Root::Real(s) => s.abs(),
             Root::Pair { frequency, .. } => frequency,
         };
         let mut sizes =
-            [Root::of(&system.poles().unwrap()), natural.poles].map(|roots| roots.iter().map(size).collect());
+            [Root::from_values(&system.poles().unwrap()), natural.poles].map(|roots| roots.iter().map(size).collect());
         sizes.iter_mut().for_each(|sizes: &mut Vec<f64>| sizes.sort_by(f64::total_cmp));
         let [want, have] = sizes;
         assert_eq!(have.len(), want.len());
         for (have, want) in have.iter().zip(&want) {
             assert!((have - want).abs() <= 1e-9 * want, "{have} {want}");
         }
-        let bare = StateSpace::of(&undamped(&machine), Operation::default()).unwrap().poles().unwrap();
-        let hertz = Root::of(&bare).into_iter().filter_map(Root::hertz);
+        let bare = StateSpace::new(&undamped(&machine), Operation::default()).unwrap().poles().unwrap();
+        let hertz = Root::from_values(&bare).into_iter().filter_map(Root::hertz);
         if machine.drives[0].motor.gear_efficiency == 1.0 {
             for (mode, want) in natural.elastic.iter().zip(hertz) {
                 assert!((mode.hertz() / want - 1.0).abs() < 1e-9);
@@ -427,8 +427,8 @@ fn a_machine_with_spans_held_is_the_one_that_follows_at_that_place() {
             .collect();
         let held = machine.with_spans_held(&slides);
         prop_assert!(!held.belt.follows_cart && held.mechanism().is_piecewise_linear());
-        let there = StateSpace::of(&machine, Operation::at(&slides)).unwrap();
-        let here = StateSpace::of(&held, Operation::default()).unwrap();
+        let there = StateSpace::new(&machine, Operation::at(&slides)).unwrap();
+        let here = StateSpace::new(&held, Operation::default()).unwrap();
         let apart = (&there.a - &here.a).amax() / there.a.amax();
         prop_assert!(apart < 1e-14, "{apart:e} of the largest element");
         // The law of a span: k = A E / l.

@@ -44,8 +44,10 @@ fn an_ideal_recorder_shows_the_run_to_the_last_bit() {
     let mut setting = case(&["motor.rotor_inertia=4e-6", "motor.gear_stiffness=300"]);
     setting.0.encoder = None;
     // A recorder has no accelerometer.
-    let quantities =
-        Quantity::of(MachineKind::Axis).iter().copied().filter(|quantity| *quantity != Quantity::CartAcceleration);
+    let quantities = Quantity::for_kind(MachineKind::Axis)
+        .iter()
+        .copied()
+        .filter(|quantity| *quantity != Quantity::CartAcceleration);
     setting.1.channels = quantities.clone().map(ideal).collect();
     let log = log(&setting);
     assert_eq!(log.len() as u64, setting.2.samples());

@@ -147,7 +147,7 @@ struct Written {
 type Vector = [f64; 7];
 
 impl Written {
-    fn of(machine: &Machine) -> Self {
+    fn new(machine: &Machine) -> Self {
         let r = machine.pulley_radius;
         let member = |friction: Friction, ratio: f64| Member { friction, ratio, along: None };
         let cart = Member { along: machine.cart.along.clone(), ..member(machine.cart.friction, 1.0) };
@@ -312,7 +312,7 @@ impl Written {
 /// The largest difference at the belt between a run and the written-out equation, m.
 fn against_the_equation(machine: &Machine, input: &Signal, until: f64) -> f64 {
     let solution = run(machine, input, until, 1e-11);
-    let mut written = Written::of(machine);
+    let mut written = Written::new(machine);
     let rows = written.rows(input, until, 2e-6);
     let (drive, cart) = (column(&solution, "drive_angle"), column(&solution, "cart_position"));
     let r = machine.pulley_radius;
@@ -501,10 +501,10 @@ fn bristles_of_bodies_made_one_are_states_of_their_own() {
     machine.idler_pulley.friction = Friction::symmetric(r * r, 0.0);
     let mut rigid = machine.clone();
     rigid.belt.model = BeltModel::Rigid;
-    let rigid = StateSpace::of(&rigid, Operation::default()).unwrap();
+    let rigid = StateSpace::new(&rigid, Operation::default()).unwrap();
     assert_eq!(rigid.states.iter().filter(|state| state.name.ends_with("bristle")).count(), 2);
     machine.belt.stiffness = [1e9; 3].into();
-    let stiff = StateSpace::of(&machine, Operation::default()).unwrap();
+    let stiff = StateSpace::new(&machine, Operation::default()).unwrap();
     let (rigid, stiff) = (rigid.poles().unwrap(), stiff.poles().unwrap());
     for pole in rigid {
         let nearest = stiff.iter().map(|other| (other - pole).norm()).fold(f64::INFINITY, f64::min);

@@ -12,8 +12,8 @@ fn moved(case: &Case, motion: &Move, every: f64) -> (MoveRun, Trajectory) {
     let profiles = motion.references(design);
     let rows = Rows { until: motion.until, every, window: motion.window };
     let mut trajectory = Trajectory::default();
-    let solver = Solver::of(&case.machine);
-    let (controllers, timing) = (&mut each(&mut controllers), Loop::of(design));
+    let solver = Solver::for_machine(&case.machine);
+    let (controllers, timing) = (&mut each(&mut controllers), Loop::new(design));
     let run = stream(&case.machine, controllers, &timing, &profiles, &rows, solver, false, &mut |block| {
         trajectory.append(block);
         Flow::Continue
@@ -177,7 +177,7 @@ fn a_cart_outside_its_window_at_the_end_has_not_settled() {
 /// A move with a row every millisecond by this solver: the positions of its cart, and what it states of them.
 fn stated(case: &Case, solver: Solver) -> (Vec<f64>, PositionError) {
     let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
-    let (machine, profiles, timing) = (&case.machine, motion.references(design), Loop::of(design));
+    let (machine, profiles, timing) = (&case.machine, motion.references(design), Loop::new(design));
     let rows = Rows { until: motion.until, every: 1e-3, window: motion.window };
     let mut own = Standard::of_drives(design, machine).unwrap();
     let controllers = &mut each(&mut own);

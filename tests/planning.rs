@@ -85,7 +85,7 @@ fn run(case: &Case, plans: &Plans) -> MoveRun {
         profiles: &planned.profiles,
         until: planned.profiles[0].rest() + 0.3,
         window: planned.window,
-        solver: Solver::of(&case.machine),
+        solver: Solver::for_machine(&case.machine),
     })
     .unwrap()
 }
@@ -347,7 +347,7 @@ fn the_least_time_of_a_rigid_axis_is_that_of_full_voltage_and_full_braking() {
         machine.belt.model = BeltModel::Rigid;
         let volts = case.controller.as_ref().unwrap().limit.unwrap();
         for distance in [0.002, 0.02, 0.3] {
-            let least = Rigid::of(&machine).quickest(distance, (Some(volts), None)).unwrap();
+            let least = Rigid::new(&machine).quickest(distance, (Some(volts), None)).unwrap();
             let time = bang_bang(&machine, volts, distance, 4.0 * least);
             assert!((least / time - 1.0).abs() < 1e-6, "{seed}, {distance} m: {least} s, {time} s simulated");
         }

@@ -95,7 +95,7 @@ fn each_limit_is_named_where_it_is_exceeded() {
     let most = |limit: &str| needed(&case.machine, motion.profile(), limit);
     let [volts, amperes, off, on] = ["voltage", "current", "slack", "tension"].map(most);
     let far = motion.profile().target();
-    let away = case.machine.breakaway(0, 1.0, 0.0) / Rigid::of(&case.machine).force_per_command();
+    let away = case.machine.breakaway(0, 1.0, 0.0) / Rigid::new(&case.machine).force_per_command();
     type Set = fn(&mut Machine, f64) -> Option<f64>;
     let limits: [(&str, f64, Set); 6] = [
         ("voltage", volts, |machine, most| {
@@ -214,7 +214,7 @@ fn a_gear_with_losses_needs_what_the_solver_says() {
         (motor.gear_efficiency, motor.gear_ratio) = (draw(0.3, 1.0), draw(0.5, 6.0));
         motor.rotor_inertia = draw(0.0, 1e-4);
         let (speed, acceleration) = (draw(-1.0, 1.0), draw(-100.0, 100.0));
-        let rigid = Rigid::of(&machine);
+        let rigid = Rigid::new(&machine);
         let (viscous, dry) = rigid.friction(speed, speed.signum());
         let force = rigid.mass * acceleration + viscous + dry;
         let y = Reference { speed, acceleration, ..Reference::default() };

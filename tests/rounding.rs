@@ -120,7 +120,7 @@ fn the_error_of_the_general_solver_was_stated_for_all() {
         (curved, square(), 1e-9),
     ] {
         let experiment = experiment(input, 0.5, 1e-3);
-        let exact = Solver::of(&machine) == Solver::Exact;
+        let exact = Solver::for_machine(&machine) == Solver::Exact;
         let best = if exact { Solver::Exact } else { Solver::General { tolerance: 1e-13 } };
         let best = complete(&machine, &experiment, best);
         let mut estimate = ErrorEstimate::new(&machine, &experiment);

@@ -132,7 +132,7 @@ fn teeth_take_the_pitch_of_the_belt() {
 /// The damping ratio of the slowest mode of a machine whose belt alone takes energy.
 fn slowest_ratio(machine: &Machine) -> f64 {
     let bare = Machine { belt: machine.belt.clone(), ..undamped(machine) };
-    let modes = Natural::of(&bare.mechanism(), &[0.0; 6]).unwrap();
+    let modes = Natural::new(&bare.mechanism(), &[0.0; 6]).unwrap();
     modes.elastic[0].damping().unwrap()
 }
 
@@ -170,7 +170,7 @@ fn both_ways_to_the_slowest_swing_agree() {
 #[test]
 fn a_drive_pushes_with_its_force_and_drags() {
     let mut machine = with("motor", "[drive]\nforce_per_input = \"0.65 N/V\"\ndrag = \"12 N s/m\"\n");
-    let drive = SimpleDrive::of(&machine.drives[0].motor, machine.pulley_radius).unwrap();
+    let drive = SimpleDrive::new(&machine.drives[0].motor, machine.pulley_radius).unwrap();
     near(drive.force, 0.65);
     near(drive.drag, 12.0);
     assert_eq!(
@@ -182,7 +182,7 @@ fn a_drive_pushes_with_its_force_and_drags() {
     let [force, drag] = keys.map(|key| Free::new(&machine, key, &keys, &[]).unwrap());
     for order in [[(&force, 2.0), (&drag, 5.0)], [(&drag, 5.0), (&force, 2.0)]] {
         set(&mut machine, order);
-        let drive = SimpleDrive::of(&machine.drives[0].motor, machine.pulley_radius).unwrap();
+        let drive = SimpleDrive::new(&machine.drives[0].motor, machine.pulley_radius).unwrap();
         near(drive.force, 2.0);
         near(drive.drag, 5.0);
     }

@@ -79,7 +79,7 @@ fn curve_of_gantry(path: &Path, case: &Case) -> String {
             rows.append(block);
             Flow::Continue
         };
-        let course = Course::of(&mechanism, experiment);
+        let course = Course::new(&mechanism, experiment);
         let outcome = stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), sink).unwrap();
         assert_eq!(outcome.ending, Ending::Complete, "{}: {}", path.display(), experiment.name);
         for kept in 0..=KEPT {
@@ -105,7 +105,7 @@ fn curve_of_axis(path: &Path, case: &Case) -> String {
         return text;
     }
     for experiment in &case.experiments {
-        let run = simulate(&case.machine, experiment, solver(Solver::of(&case.machine))).unwrap();
+        let run = simulate(&case.machine, experiment, solver(Solver::for_machine(&case.machine))).unwrap();
         assert_eq!(run.outcome.ending, Ending::Complete, "{}: {}", path.display(), experiment.name);
         let column = |name: &str| run.trajectory.get(name).unwrap();
         for kept in 0..=KEPT {

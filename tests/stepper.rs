@@ -351,7 +351,7 @@ impl Motor {
 fn apart_from_linear(case: &Case, steps: &[f64], outputs: &[(&str, f64)], motors: &[(&str, [&str; 3])]) -> f64 {
     let run = simulate(&case.machine, &case.experiments[0], Solver::General { tolerance: 1e-13 }).unwrap();
     assert_eq!(run.outcome.ending, Ending::Complete);
-    let system = System::of(&case.machine, Operation { speed: 0.0, ..Operation::default() }).unwrap();
+    let system = System::new(&case.machine, Operation { speed: 0.0, ..Operation::default() }).unwrap();
     let every = case.experiments[0].every;
     let models: Vec<_> = (0..steps.len()).map(|k| system.input(k).discrete(every, Hold::Zero, 0.0).unwrap()).collect();
     let mut states: Vec<_> = models.iter().map(|model| &model.b * 0.0).collect();
@@ -449,7 +449,7 @@ fn apart_at_speed(text: &str, speed: f64, step: f64) -> f64 {
         (run.trajectory.get("cart_position").unwrap().to_vec(), case)
     };
     let ((without, case), (with, _)) = (run(0.0), run(step));
-    let system = StateSpace::of(&case.machine, Operation { speed, ..Operation::default() }).unwrap();
+    let system = StateSpace::new(&case.machine, Operation { speed, ..Operation::default() }).unwrap();
     let model = system.discrete(1e-3, Hold::Zero, 0.0).unwrap();
     let (row, mut x, mut most) = (system.output("cart_position").unwrap(), &model.b * 0.0, 0.0_f64);
     for k in 500..=520 {
@@ -487,7 +487,7 @@ fn all_that_a_stepper_moves_swings_on_the_stiffness_of_its_field() {
         };
         let case = Case::from_text("alone.toml", &text).unwrap();
         for (speed, torque) in [(1e-4, holding), (0.0, holding - 4.0 * detent)] {
-            let analysis = Analysis::of(&case, &Question { speed: Some(speed), ..Question::default() }).unwrap();
+            let analysis = Analysis::new(&case, &Question { speed: Some(speed), ..Question::default() }).unwrap();
             let modes = analysis.modes.as_ref().unwrap();
             assert!(modes.rigid.is_empty());
             assert!((modes.elastic[0].hertz() / hertz(holding) - 1.0).abs() < 1e-4);
@@ -511,7 +511,7 @@ fn a_supply_that_limits_the_currents_has_no_linear_model() {
     for (text, speed) in [(&low, 0.0), (&fast, 3.0)] {
         let case = Case::from_text("low.toml", text).unwrap();
         let question = Question { speed: Some(speed), ..Question::default() };
-        let error = Analysis::of(&case, &question).unwrap_err().to_string();
+        let error = Analysis::new(&case, &question).unwrap_err().to_string();
         assert!(error.starts_with("--speed: ") && error.contains("the supply of"), "{error}");
         assert!(error.contains("allowed: ") && error.contains("next: "), "{error}");
     }
@@ -564,7 +564,7 @@ fn the_pull_out_torque_that_is_shown_is_that_at_which_a_slow_ramp_loses_its_step
     let speed = acceleration * first.expect("it loses steps").time / radius;
     let inertia = 5.4e-6 + 2e-6 + 0.05 * radius * radius;
     let needed = damping * speed + inertia * acceleration / radius;
-    let shown = PullOut::of(&case.machine).unwrap().torque(speed);
+    let shown = PullOut::new(&case.machine).unwrap().torque(speed);
     assert!((needed / shown - 1.0).abs() < 0.04, "{needed} N m at {speed} rad/s, shown {shown} N m");
 }
 
@@ -733,8 +733,8 @@ fn drawn_plotters_with_steppers_follow_their_paths_as_their_phases_take_them() {
             kept.append(block);
             Flow::Continue
         };
-        let (profiles, timing) = (motion.references(design), Loop::of(design));
-        let solver = Solver::of(&case.machine);
+        let (profiles, timing) = (motion.references(design), Loop::new(design));
+        let solver = Solver::for_machine(&case.machine);
         let run =
             stream(&case.machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, false, &mut sink)
                 .unwrap();
@@ -779,7 +779,7 @@ fn a_move_beyond_the_pull_out_torque_is_told_and_a_planned_one_loses_no_step() {
             profiles: &motion.profiles,
             until,
             window: motion.window,
-            solver: Solver::of(&case.machine),
+            solver: Solver::for_machine(&case.machine),
         };
         closed_loop(&setup).unwrap()
     };
@@ -787,7 +787,7 @@ fn a_move_beyond_the_pull_out_torque_is_told_and_a_planned_one_loses_no_step() {
     assert!(!far.metrics.in_step());
     assert!(planned.metrics.in_step() && planned.metrics.cart().command_error.unwrap().abs() < 5e-5);
     // The quickest one that takes six tenths of the torque everywhere is not slow.
-    let most = PullOut::of(&case.machine).unwrap().largest_acceleration(&case.machine, 0.1);
+    let most = PullOut::new(&case.machine).unwrap().largest_acceleration(&case.machine, 0.1);
     let bound = 2.0 * (0.1 / most).sqrt();
     let end = case.moves[1].end();
     assert!(bound < end && end < 2.2 * bound, "{end} s, {bound} s at the pull-out torque");

@@ -165,7 +165,7 @@ fn outputs_are_the_row_of_a_run() {
         let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
         let case = taut::case::Case::read(path).unwrap();
         let input = Signal::Pulse { value: 2.0, duration: 0.05, at: 0.0 };
-        let solver = Solver::of(&case.machine);
+        let solver = Solver::for_machine(&case.machine);
         let (last, _) = in_one_go(&case.machine, &input, solver);
         let (machine, _) = stepped(Simulator::new(&case.machine, solver).unwrap(), &[input], UNTIL, &[0.1, 0.37], true);
         let mut outputs = vec![0.0; machine.columns().len()];

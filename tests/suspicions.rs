@@ -32,7 +32,7 @@ fn drawn_from(text: &str, apart: f64, seed: u64, noise: f64, late: usize) -> Cas
     let mut experiment = case.experiments[0].clone();
     (experiment.until, experiment.every) = ((COUNT - 1) as f64 * EVERY, EVERY);
     experiment.inputs[0] = Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero };
-    let run = simulate(&truth, &experiment, Solver::of(&truth)).unwrap().trajectory;
+    let run = simulate(&truth, &experiment, Solver::for_machine(&truth)).unwrap().trajectory;
     let narrow = narrow(&mut chance);
     let position = run.get("cart_position").unwrap();
     let mut values: Vec<f64> =
@@ -108,7 +108,7 @@ fn a_cart_on_a_soft_belt_is_not_taken_for_a_wrong_sign_or_unit() {
         let mut case = Case::from_text_with("axis.toml", TEMPLATE, &[&soft[..], &[&input]].concat()).unwrap();
         case.experiments.truncate(1);
         let experiment = &mut case.experiments[0];
-        let run = simulate(&case.machine, experiment, Solver::of(&case.machine)).unwrap().trajectory;
+        let run = simulate(&case.machine, experiment, Solver::for_machine(&case.machine)).unwrap().trajectory;
         let column = |name: &str| run.get(name).unwrap().to_vec();
         let mut chance = Chance::new(tenths);
         let mut noisy = |quantity, name, noise: f64| {
@@ -238,7 +238,7 @@ fn a_slip_between_two_samples_is_no_jump() {
         let experiment = &mut case.experiments[0];
         (experiment.until, experiment.every) = (399.0 * every, every);
         experiment.inputs = vec![Signal::Sampled { times: time.clone(), values: input.clone(), hold: Hold::Zero }];
-        let run = simulate(&truth, experiment, Solver::of(&truth)).unwrap().trajectory;
+        let run = simulate(&truth, experiment, Solver::for_machine(&truth)).unwrap().trajectory;
         let position = run.get("cart_position").unwrap();
         let values = position.iter().map(|x| x + 1e-5 * chance.normal()).collect();
         experiment.log = Some(columns("log", time, input, vec![output(Quantity::CartPosition, values)]));

@@ -311,9 +311,10 @@ fn a_bench_shows_what_a_stream_shows() {
             bench.mount(&stage).unwrap();
             for experiment in &case.experiments {
                 let (mut whole, mut short) = (Meter::new(&stage, experiment), Meter::new(&stage, experiment));
-                let outcome =
-                    stream_observed(&stage, experiment, Solver::of(&stage), &mut whole, &mut |_| Flow::Continue)
-                        .unwrap();
+                let outcome = stream_observed(&stage, experiment, Solver::for_machine(&stage), &mut whole, &mut |_| {
+                    Flow::Continue
+                })
+                .unwrap();
                 let other = bench.observe(experiment, &mut short).unwrap();
                 assert_eq!((&outcome.events, outcome.ending), (&other.events, other.ending), "{file}");
                 let (whole, short) = (whole.finish(&outcome.events), short.finish(&other.events));
@@ -451,7 +452,7 @@ fn machines_come_from_a_fit() {
     ];
     let sweep = Sweep::new(&Case::read_with(&path, &changes).unwrap()).unwrap();
     let masses = sweep.values(0, 1000).get("cart.mass").unwrap().to_vec();
-    let spread = Spread::of(&masses).unwrap();
+    let spread = Spread::new(&masses).unwrap();
     assert!((spread.mean - 0.362).abs() < 1e-4 && (spread.deviation - 0.01).abs() < 2e-4);
     std::fs::remove_dir_all(&folder).unwrap();
 }
@@ -475,15 +476,15 @@ fn plans_that_exclude_themselves_are_told() {
 #[test]
 fn statistics_of_a_column() {
     let values: Vec<f64> = (0..=100).map(f64::from).chain([f64::NAN]).collect();
-    let spread = Spread::of(&values).unwrap();
+    let spread = Spread::new(&values).unwrap();
     assert_eq!(
         (spread.count, spread.missing, spread.mean, spread.quantiles),
         (101, 1, 50.0, [0.0, 5.0, 50.0, 95.0, 100.0])
     );
     assert_eq!(spread.counts.iter().sum::<usize>(), 101);
-    assert_eq!(Spread::of(&[f64::NAN]), None);
+    assert_eq!(Spread::new(&[f64::NAN]), None);
     let squares: Vec<f64> = values.iter().map(|value| value * value).collect();
-    let rank_correlation = |x: &[f64], y: &[f64]| Ranked::of(x).correlation(&Ranked::of(y));
+    let rank_correlation = |x: &[f64], y: &[f64]| Ranked::new(x).correlation(&Ranked::new(y));
     assert!((rank_correlation(&values, &squares) - 1.0).abs() < 1e-12);
     let falling: Vec<f64> = values.iter().map(|value| (-value / 9.0).exp()).collect();
     assert!((rank_correlation(&values, &falling) + 1.0).abs() < 1e-12);
@@ -513,7 +514,7 @@ fn rank_correlations_are_those_of_the_definition_where_values_are_equal_or_missi
     let product =
         |a: usize, b: usize| both.iter().map(|pair| (rank(a, pair[a]) - mean) * (rank(b, pair[b]) - mean)).sum::<f64>();
     let expected = product(0, 1) / (product(0, 0) * product(1, 1)).sqrt();
-    let (x, y) = (Ranked::of(&x), Ranked::of(&y));
+    let (x, y) = (Ranked::new(&x), Ranked::new(&y));
     assert!(expected > 0.3 && both.len() < 175, "{expected} of {}", both.len());
     assert_eq!([x.correlation(&y), y.correlation(&x)].map(|is| (is - expected).abs() < 1e-14), [true; 2]);
     assert_eq!(x.correlation(&x), 1.0);

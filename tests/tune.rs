@@ -97,7 +97,7 @@ fn placement_gives_the_asked_bandwidth_and_damping() {
         for (hertz, damping) in [(5.0, 1.0), (9.0, 0.6), (14.0, 0.8)] {
             let case = case(name, &[]);
             let design = place(case.controller.as_ref().unwrap(), &case.machine, hertz, damping).unwrap();
-            let rigid = Rigid::of(&case.machine);
+            let rigid = Rigid::new(&case.machine);
             let w = 2.0 * PI * hertz;
             match &design.structure {
                 Structure::Pid(gains) if rigid_poles => {
@@ -149,7 +149,7 @@ fn a_placed_loop_swings_as_asked() {
     let feedback = Feedback::new(&design, &case.machine).unwrap();
     let plant = Plant::of(&case.machine, Operation::default(), &design, &[]).unwrap();
     // |T| of a PD loop on M s² + d s: (2ζ′ω s + ω²)/(s² + 2ζω s + ω²), ζ′ what K_d gives of ζ
-    let rigid = Rigid::of(&case.machine);
+    let rigid = Rigid::new(&case.machine);
     let Structure::Pid(gains) = &design.structure else { panic!() };
     let (g, w) = (rigid.force_per_command(), 2.0 * PI * hertz);
     let most = (0..20_000)
@@ -200,7 +200,7 @@ fn the_constraint_is_met_by_a_dense_sweep() {
         stage.belt.follows_cart = true;
         use taut::linear::{Hold, StateSpace};
         let about = Operation { position: corner.place, ..Operation::default() };
-        let system = StateSpace::of(&stage, about).unwrap();
+        let system = StateSpace::new(&stage, about).unwrap();
         let model = system.discrete(design.every, Hold::Zero, design.delay).unwrap();
         let drive = system.output("drive_angle").unwrap();
         let n = model.a.nrows();
@@ -466,7 +466,7 @@ fn a_brief_run_shows_what_a_whole_one_does() {
         let design = case.controller.as_ref().unwrap();
         for motion in &case.moves {
             let (stage, profiles) = (&case.machine, &motion.profiles);
-            let (until, window, solver) = (motion.until, motion.window, taut::solve::Solver::of(stage));
+            let (until, window, solver) = (motion.until, motion.window, taut::solve::Solver::for_machine(stage));
             let setup = taut::control::Setup { machine: stage, model: stage, design, profiles, until, window, solver };
             let whole = taut::control::closed_loop(&setup).unwrap().figures;
             let brief = taut::tune::look(stage, stage, design, motion).unwrap();

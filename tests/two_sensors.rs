@@ -33,7 +33,7 @@ fn run(case: &Case, until: f64) -> MoveRun {
         profiles: &motion.profiles,
         until,
         window: motion.window,
-        solver: Solver::of(&case.machine),
+        solver: Solver::for_machine(&case.machine),
     })
     .unwrap()
 }

@@ -16,7 +16,8 @@ fn made(own: &[&str], truth: &[&str], experiments: &[usize], mut noise: impl FnM
     let step = std::f64::consts::TAU / 2048.0;
     case.experiments = experiments.iter().map(|&index| case.experiments[index].clone()).collect();
     for (experiment, index) in case.experiments.iter_mut().zip(experiments) {
-        let run = simulate(&real.machine, &real.experiments[*index], Solver::of(&real.machine)).unwrap().trajectory;
+        let run =
+            simulate(&real.machine, &real.experiments[*index], Solver::for_machine(&real.machine)).unwrap().trajectory;
         let angle = run.get("drive_angle").unwrap();
         let values = angle.iter().enumerate().map(|(k, v)| step * ((v + noise(k, *v)) / step).round()).collect();
         experiment.log = Some(logged(&experiment.name, &run, values));
@@ -162,7 +163,7 @@ fn last_digits_of_a_log_speak_for_no_law() {
         let mut case = Case::from_text("axis.toml", TEMPLATE).unwrap();
         let machine = case.machine.clone();
         for experiment in &mut case.experiments {
-            let run = simulate(&machine, experiment, Solver::of(&machine)).unwrap().trajectory;
+            let run = simulate(&machine, experiment, Solver::for_machine(&machine)).unwrap().trajectory;
             let told = |angle: &f64| format!("{angle:.digits$}").parse().unwrap();
             let values = run.get("drive_angle").unwrap().iter().map(told).collect();
             experiment.log = Some(logged(&experiment.name, &run, values));

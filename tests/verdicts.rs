@@ -41,7 +41,7 @@ fn slips(case: &Case, target: f64, watched: f64) -> Vec<f64> {
     let profile = Profile::new(0.0, &[Leg::To(target, limits)]).unwrap();
     let (design, from) = (case.controller.as_ref().unwrap(), profile.end());
     let mut controller = Standard::new(design, &case.machine).unwrap();
-    let (timing, solver) = (Loop::of(design), Solver::of(&case.machine));
+    let (timing, solver) = (Loop::new(design), Solver::for_machine(&case.machine));
     let run = close(&case.machine, &mut [&mut controller], &timing, &[profile], from + watched, 1e-4, solver).unwrap();
     let breakaway = |event: &&Event| event.body() == Some(CART) && event.from.code() == Motion::Stuck.code();
     let mut times: Vec<f64> = run.outcome.events.iter().filter(breakaway).map(|event| event.time - from).collect();

@@ -32,7 +32,7 @@ pub fn controllers(_: &Request, _: &Context) -> Result<Reply> {
         Ok(json!({ "name": case.title, "file": path, "controller": told("controller")?, "moves": told("move")? }))
     };
     let all = stages::inside("sollmann-jouaneh/controllers").map(one).collect::<Result<Vec<_>>>()?;
-    Ok(Reply::of(json!({ "controllers": all })))
+    Ok(Reply::new(json!({ "controllers": all })))
 }
 
 /// A value of a case on one line.
@@ -57,7 +57,7 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
     let (design, moves) = case.moves_named(context.host.name(), &[])?;
     let place = (request.number("move").unwrap_or(0.0).max(0.0) as usize).min(moves.len() - 1);
     let motion = moves[place];
-    let shown = Curves::of(&case.machine);
+    let shown = Curves::new(&case.machine);
     let mut kept = shown.columns();
     let done = moved(&case, design, motion, context, &mut |block| kept.take(block))?;
     let tried = Tried { case: &case, design, done: vec![done] };
@@ -66,13 +66,13 @@ pub fn closed(request: &Request, context: &Context) -> Result<Reply> {
     let told = taut::json::moves(
         &case.title,
         design.structure.name(),
-        &Loop::of(design),
+        &Loop::new(design),
         &case.machine,
         &[done.told(&case.machine)],
     );
     let opened = case.clone();
     let sliding = if case.is_axis() { "cart" } else { "bridge or cart" };
-    let mut reply = Reply::of(json!({
+    let mut reply = Reply::new(json!({
         "title": case.title,
         "text": case.text,
         "moves": moves.iter().map(|one| json!({ "name": one.name, "until": one.until })).collect::<Vec<_>>(),
@@ -128,7 +128,7 @@ pub fn moved<'a>(
         sink(block);
         context.flow()
     };
-    let (timing, solver) = (Loop::of(design), Solver::of(machine));
+    let (timing, solver) = (Loop::new(design), Solver::for_machine(machine));
     let run = stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, false, &mut take)?;
     let trouble = trouble::trouble(machine, design, &run, motion);
     let shortfalls = motion.shortfalls(machine, design);
@@ -177,7 +177,7 @@ struct Curves {
 }
 
 impl Curves {
-    fn of(machine: &Machine) -> Self {
+    fn new(machine: &Machine) -> Self {
         let geometry = machine.geometry();
         let slides: Vec<&str> = geometry.slides.iter().map(|slide| geometry.label(slide.body).key).collect();
         let is_alone = slides.len() == 1;
@@ -264,7 +264,7 @@ pub fn tuned(request: &Request, context: &Context) -> Result<Reply> {
     let choices = tuned.choices.iter().map(|choice| {
         json!({ "name": choice.name, "chosen": choice.chosen, "worst": choice.worst.iter().map(point).collect::<Vec<_>>() })
     });
-    Ok(Reply::of(json!({
+    Ok(Reply::new(json!({
         "html": page.body(),
         "result": taut::json::tuned(&case, &tuning, &tuned),
         "text": text,

@@ -19,5 +19,5 @@ pub fn gallery(_: &Request, _: &Context) -> Result<Reply> {
     };
     let is_shown = |(path, _): &&(&str, &str)| !path.contains("/controllers/") || *path == CONTROLLER;
     let stages = STAGES.iter().filter(is_shown).map(one).collect::<Result<Vec<Value>>>()?;
-    Ok(Reply::of(json!({ "stages": stages })))
+    Ok(Reply::new(json!({ "stages": stages })))
 }

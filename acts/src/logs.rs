@@ -47,11 +47,11 @@ pub fn columns(request: &Request, context: &Context) -> Result<Reply> {
     let keys =
         |(key, column, unit): &(&str, usize, Option<String>)| json!({ "key": key, "column": column, "unit": unit });
     let quantity = |quantity: Quantity| json!({ "key": quantity.name(), "unit": quantity.unit() });
-    Ok(Reply::of(json!({
+    Ok(Reply::new(json!({
         "found": columns.iter().map(one).collect::<Vec<_>>(),
         "rows": rows,
         "guess": { "preset": guess.preset, "columns": guess.columns.iter().map(keys).collect::<Vec<_>>(), "split": guess.split },
-        "quantities": Quantity::of(MachineKind::Axis).iter().copied().map(quantity).collect::<Vec<_>>(),
+        "quantities": Quantity::for_kind(MachineKind::Axis).iter().copied().map(quantity).collect::<Vec<_>>(),
         "presets": PRESETS.iter().map(|preset| json!({ "name": preset.name, "title": preset.title })).collect::<Vec<_>>(),
     })))
 }
@@ -90,7 +90,7 @@ pub fn check(request: &Request, context: &Context) -> Result<Reply> {
     }
     let found = found?;
     let page = taut_report::check::page(&case, &found);
-    Ok(Reply::of(json!({ "html": page.body(), "result": taut::json::check(&case, &found) })))
+    Ok(Reply::new(json!({ "html": page.body(), "result": taut::json::check(&case, &found) })))
 }
 
 fn stopped() -> Error {
@@ -121,7 +121,7 @@ pub fn fit(request: &Request, context: &Context) -> Result<Reply> {
     let text = fit.case_text(&case, context.host.name())?;
     let page = taut_report::fit::page(&case, &found, &text);
     let result = taut::json::fit(&case, fit, &found.profiles, None);
-    Ok(Reply::of(json!({
+    Ok(Reply::new(json!({
         "html": page.body(),
         "result": result,
         "fitted": text,

@@ -62,7 +62,7 @@ pub struct Reply {
 
 impl Reply {
     /// A head alone.
-    pub fn of(head: Value) -> Self {
+    pub fn new(head: Value) -> Self {
         match head {
             Value::Object(head) => Self { head, columns: Vec::new() },
             other => Self { head: Map::from_iter([("value".to_string(), other)]), columns: Vec::new() },
@@ -76,7 +76,7 @@ impl Reply {
         // Columns of a change are those of `KEY=VALUE`, which stands nowhere in the text.
         let is_change = place.is_some_and(|place| place.file == Path::new("--set"));
         let (span, change) = if is_change { (None, span) } else { (span, None) };
-        Self::of(json!({ "error": {
+        Self::new(json!({ "error": {
             "what": error.what,
             "file": place.map(|place| place.file.display().to_string()),
             "line": span.map(|span| span.line),

@@ -15,8 +15,8 @@ pub fn modes(request: &Request, context: &Context) -> Result<Reply> {
     let case = opened_for(request, context, Files::Nothing)?;
     let speed = request.number("speed").filter(|speed| *speed > 0.0).unwrap_or(1.0);
     let friction = friction::page(&case, speed);
-    let analysis = Analysis::of(&case, &Question::default())?;
+    let analysis = Analysis::new(&case, &Question::default())?;
     let page = modes::page(&analysis, &modes::pictures(&analysis));
     let result = taut::json::modes(&analysis);
-    Ok(Reply::of(json!({ "html": format!("{}{}", page.body(), friction.body()), "result": result })))
+    Ok(Reply::new(json!({ "html": format!("{}{}", page.body(), friction.body()), "result": result })))
 }

@@ -10,7 +10,7 @@ use taut::error::Result;
 pub fn open(_: &Request, context: &Context) -> Result<Reply> {
     let case = context.host.opened();
     let (path, text) = case.unzip();
-    Ok(Reply::of(json!({
+    Ok(Reply::new(json!({
         "version": env!("CARGO_PKG_VERSION"),
         "text": text.unwrap_or_else(|| TEMPLATE.to_string()),
         "path": path.map(|path| path.display().to_string()),

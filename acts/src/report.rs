@@ -13,9 +13,9 @@ use taut_report::simulate;
 pub fn report(request: &Request, context: &Context) -> Result<Reply> {
     let case = &opened(request, context)?;
     case.complete()?;
-    let solver = Solver::of(&case.machine);
+    let solver = Solver::for_machine(&case.machine);
     let experiments = case.experiments.iter();
     let runs = experiments.map(|one| simulated(case, one, solver, context, &mut Keep::Curves));
     let (page, _) = simulate::report(case, &case.text, solver, &runs.collect::<Result<Vec<_>>>()?, false);
-    Ok(Reply::of(json!({ "html": page.html() })))
+    Ok(Reply::new(json!({ "html": page.html() })))
 }

@@ -34,7 +34,7 @@ pub fn run(request: &Request, context: &Context) -> Result<Reply> {
     };
     let took = context.elapsed() - begun;
     let numbers = case.numbers()?;
-    let mut reply = Reply::of(json!({
+    let mut reply = Reply::new(json!({
         "title": case.title.as_str(),
         "has_controller": case.controller.is_some(),
         "has_moves": !case.moves.is_empty(),
@@ -87,7 +87,7 @@ fn experiment_run(case: &Case, place: usize, context: &Context) -> Result<(Simul
     let opened = case.clone();
     let panels = panels(&opened, &machine.mechanism().columns);
     let shown = Experiment { every: interval(experiment.every, experiment.samples()), ..experiment.clone() };
-    let solver = Solver::of(machine);
+    let solver = Solver::for_machine(machine);
     let mut kept = Kept::new(&panels);
     let run = simulated(case, &shown, solver, context, &mut Keep::Columns(&mut kept))?;
     let lines = simulate::lines(&run, machine, solver);
@@ -111,7 +111,7 @@ fn move_run(case: &Case, place: usize, context: &Context) -> Result<(Simulated, 
     let panels = panels(&opened, &case.machine.mechanism().columns);
     let mut kept = Kept::new(&panels);
     let done = crate::closed::moved(case, design, moves[place], context, &mut |block| kept.take(block))?;
-    let timing = Loop::of(design);
+    let timing = Loop::new(design);
     let json =
         taut::json::moves(&case.title, design.structure.name(), &timing, &case.machine, &[done.told(&case.machine)]);
     let tried = Tried { case, design, done: vec![done] };
@@ -153,7 +153,7 @@ pub fn simulated<'a>(
         context.flow()
     })?;
     let metrics = meter.finish(&outcome.events);
-    let reduction = Reduction::of(machine, experiment, solver)?;
+    let reduction = Reduction::new(machine, experiment, solver)?;
     let took = Duration::try_from_secs_f64(context.elapsed() - begun).unwrap_or_default();
     Ok(simulate::SimulatedExperiment {
         experiment,
@@ -194,7 +194,7 @@ fn event(event: &solve::Event) -> Value {
 
 /// Consequences of the numbers at a glance: groups of names and values.
 fn overview(case: &Case) -> Value {
-    let Ok(overview) = Overview::of(case) else { return Value::Null };
+    let Ok(overview) = Overview::new(case) else { return Value::Null };
     let row = |row: &taut::overview::Row| json!({ "key": row.key, "name": row.name, "value": taut_report::show::value(row), "how": row.how });
     let groups: Vec<Value> = overview
         .groups

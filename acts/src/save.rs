@@ -8,5 +8,5 @@ use taut::error::Result;
 /// Writes `text` into the file of the command line.
 pub fn save(request: &Request, context: &Context) -> Result<Reply> {
     let path = context.host.save(request.text("text")?)?;
-    Ok(Reply::of(json!({ "saved": path.display().to_string() })))
+    Ok(Reply::new(json!({ "saved": path.display().to_string() })))
 }

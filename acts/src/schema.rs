@@ -7,5 +7,5 @@ use taut::error::Result;
 
 /// The schema of case files, as `taut schema case` prints it.
 pub fn schema(_: &Request, _: &Context) -> Result<Reply> {
-    Ok(Reply::of(json!({ "schema": taut::json::case_schema() })))
+    Ok(Reply::new(json!({ "schema": taut::json::case_schema() })))
 }

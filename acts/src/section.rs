@@ -34,7 +34,7 @@ pub fn section(request: &Request, context: &Context) -> Result<Reply> {
     let mut kept = Kept::new(&panels(&case, &mechanism.columns));
     let window = Window { from, to, points };
     rows(&mechanism, (&experiment.inputs, &start), (&window, experiment.every), &mut kept, context)?;
-    let mut reply = Reply::of(json!({ "from": from, "to": to, "columns": kept.told() }));
+    let mut reply = Reply::new(json!({ "from": from, "to": to, "columns": kept.told() }));
     reply.columns = kept.columns;
     Ok(reply)
 }

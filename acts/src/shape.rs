@@ -22,5 +22,5 @@ pub fn shape(request: &Request, context: &Context) -> Result<Reply> {
     let question = Question { axis, together: request.flag("together"), ..Question::default() };
     let found = recommend(&question, &files)?;
     let page = page(&found, &figures(&found));
-    Ok(Reply::of(json!({ "html": page.body(), "result": taut::json::shape(&found) })))
+    Ok(Reply::new(json!({ "html": page.body(), "result": taut::json::shape(&found) })))
 }

@@ -49,7 +49,7 @@ pub fn sweep(request: &Request, context: &Context) -> Result<Reply> {
     let begun = context.elapsed();
     (context.progress)(json!({ "runs": sweep.runs(), "headings": headings(&sweep), "rows": [] }));
     let table = rows(&sweep, context);
-    let mut reply = Reply::of(json!({
+    let mut reply = Reply::new(json!({
         "title": case.title.as_str(),
         "runs": sweep.runs(),
         "done": table.len(),
@@ -158,7 +158,7 @@ pub fn traces(request: &Request, context: &Context) -> Result<Reply> {
             columns.push(values);
         }
     }
-    let mut reply = Reply::of(json!({ "panels": crate::curves::told(&shown), "columns": told }));
+    let mut reply = Reply::new(json!({ "panels": crate::curves::told(&shown), "columns": told }));
     reply.columns = columns;
     Ok(reply)
 }

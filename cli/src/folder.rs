@@ -156,7 +156,7 @@ impl Folder {
     /// not write in this one; what somebody changed since stays, and is named. Returns the names of what was written.
     pub fn place(&self, command: &str, quiet: bool) -> std::result::Result<Vec<PathBuf>, Failure> {
         let mut names = self.batch.names().map_err(Failure::work)?;
-        let mut list = Listing::of(command, &self.batch.path(""), &names).map_err(Failure::work)?;
+        let mut list = Listing::new(command, &self.batch.path(""), &names).map_err(Failure::work)?;
         let mut left = Left::default();
         if let Some(earlier) = Listing::read(&self.root) {
             left = earlier.left(command, &self.root, &names);

@@ -51,7 +51,7 @@ pub struct Left {
 
 impl Listing {
     /// Of these files, written below `at` by `command`.
-    pub fn of(command: &str, at: &Path, names: &[PathBuf]) -> Result<Self> {
+    pub fn new(command: &str, at: &Path, names: &[PathBuf]) -> Result<Self> {
         let entry = |name: &PathBuf| {
             let (bytes, sha256) = fingerprint(&at.join(name))
                 .map_err(|e| Error::new(format!("this file cannot be read back: {e}")).in_file(name))?;
@@ -137,7 +137,7 @@ mod tests {
         let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
         ["kept.csv", "stale.csv", "changed.csv", "gone.csv"].iter().for_each(|name| write(name, name));
         let names = ["kept.csv", "stale.csv", "changed.csv", "gone.csv"].map(PathBuf::from);
-        let mut list = Listing::of("simulate", folder.path(), &names).unwrap();
+        let mut list = Listing::new("simulate", folder.path(), &names).unwrap();
         let outside =
             Entry { path: "../outside.csv".into(), bytes: 0, sha256: String::new(), command: "simulate".into() };
         list.files.push(outside);
@@ -150,7 +150,7 @@ mod tests {
         assert_eq!(left, Left { stale: vec!["stale.csv".into()], changed: vec!["changed.csv".into()] });
         // Another command leaves them all alone, and lists them still.
         assert_eq!(list.left("modes", folder.path(), &[]), Left::default());
-        let both = Listing::of("modes", folder.path(), &["kept.csv".into()]).unwrap().with_others("modes", list);
+        let both = Listing::new("modes", folder.path(), &["kept.csv".into()]).unwrap().with_others("modes", list);
         assert_eq!(both.files.iter().filter(|entry| entry.path == "kept.csv").count(), 1);
         assert_eq!(both.files.len(), 5);
     }

@@ -153,7 +153,7 @@ pub fn estimate(log: &Log, cut: &Cut) -> Result<Vec<Frf>> {
 pub fn estimate_all(kind: MachineKind, logs: &[&Log], cut: &Cut) -> Result<(Vec<Frf>, Vec<String>)> {
     let (mut each, mut rest) = (Vec::new(), Vec::new());
     for log in logs {
-        let spectra = Spectra::of(&[*log], cut)?;
+        let spectra = Spectra::new(&[*log], cut)?;
         let is_whole = (0..spectra.drives()).all(|drive| spectra.tells(drive));
         match is_whole || logs.len() == 1 || spectra.drives() == 1 {
             true => each.push(spectra),
@@ -161,7 +161,7 @@ pub fn estimate_all(kind: MachineKind, logs: &[&Log], cut: &Cut) -> Result<(Vec<
         }
     }
     if !rest.is_empty() {
-        each.push(Spectra::of(&rest, cut)?);
+        each.push(Spectra::new(&rest, cut)?);
     }
     let (mut frfs, mut warnings) = (Vec::new(), Vec::new());
     for spectra in each {
@@ -259,7 +259,7 @@ pub struct Measurement {
 impl Known {
     /// Operating point of a case, for these positions of cart and bridge, m, zero by default, and this delay, s, by
     /// default that of the controller. Errors: NaN, a position outside the travel, or a position of a missing bridge.
-    pub fn of(case: &Case, at: Option<f64>, bridge: Option<f64>, delay: Option<f64>) -> Result<Self> {
+    pub fn new(case: &Case, at: Option<f64>, bridge: Option<f64>, delay: Option<f64>) -> Result<Self> {
         for (option, value) in [("--at", at), ("--bridge", bridge), ("--delay", delay)] {
             if let Some(value) = value.filter(|value| !value.is_finite()) {
                 let error = Error::new(format!("{value:?} is of no use here")).in_file(option);

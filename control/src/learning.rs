@@ -95,7 +95,7 @@ pub struct Size {
 }
 
 impl Size {
-    fn of(error: &[f64]) -> Self {
+    fn new(error: &[f64]) -> Self {
         let sum: f64 = error.iter().map(|e| e * e).sum();
         let peak = error.iter().fold(0.0_f64, |most, e| most.max(e.abs()));
         Self { rms: (sum / error.len().max(1) as f64).sqrt(), peak }
@@ -258,7 +258,7 @@ fn learned<const M: usize>(
     let next = |drive: usize| weighed(&predictions.next, shares[drive], n);
     let drives = before.into_iter().enumerate().map(|(drive, before)| DriveSignal { before, next: next(drive) });
     let of_slide = |(slide, error): (usize, &Vec<f64>)| SlideError {
-        now: Size::of(error),
+        now: Size::new(error),
         error: error.clone(),
         expected: predictions.expected[slide].clone(),
         predicted: predictions.sizes[slide].clone(),
@@ -387,7 +387,7 @@ impl Transform {
         if k == 0 { 1e-3 * step } else { k as f64 * step }
     }
 
-    fn of(&self, signal: &[f64]) -> Spectrum {
+    fn apply(&self, signal: &[f64]) -> Spectrum {
         let mut all = vec![Complex::new(0.0, 0.0); self.length];
         all.iter_mut().zip(signal).for_each(|(place, value)| place.re = *value);
         self.there.process(&mut all);
@@ -408,7 +408,7 @@ impl Transform {
 
     /// Σ |X|² over chosen frequencies.
     fn squared(&self, signal: &[f64], is_chosen: &dyn Fn(usize) -> bool) -> f64 {
-        self.of(signal).iter().enumerate().filter(|(k, _)| is_chosen(*k)).map(|(_, x)| x.norm_sqr()).sum()
+        self.apply(signal).iter().enumerate().filter(|(k, _)| is_chosen(*k)).map(|(_, x)| x.norm_sqr()).sum()
     }
 }
 
@@ -514,8 +514,8 @@ impl<const M: usize> Rule<M> {
     /// w⁺ = Q (w + L e)
     fn next(&self, transform: &Transform, errors: &[Vec<f64>], signals: &[Vec<f64>], taper: &[f64]) -> Vec<Vec<f64>> {
         let tapered = |error: &Vec<f64>| -> Vec<f64> { error.iter().zip(taper).map(|(e, share)| e * share).collect() };
-        let e: Vec<Spectrum> = errors.iter().map(|error| transform.of(&tapered(error))).collect();
-        let w: Vec<Spectrum> = signals.iter().map(|signal| transform.of(signal)).collect();
+        let e: Vec<Spectrum> = errors.iter().map(|error| transform.apply(&tapered(error))).collect();
+        let w: Vec<Spectrum> = signals.iter().map(|signal| transform.apply(signal)).collect();
         let next = |k: usize| (vector(&w, k) + self.gain[k] * vector(&e, k)) * Complex::from(self.kept[k]);
         parted((0..transform.bins()).map(next), transform)
     }
@@ -535,7 +535,7 @@ impl<const M: usize> Rule<M> {
             for trial in 0..PREDICTED {
                 // e⁺ = e − T (w⁺ − w)
                 let change = |(next, before): (&Vec<f64>, &Vec<f64>)| -> Spectrum {
-                    transform.of(&next.iter().zip(before).map(|(next, before)| next - before).collect::<Vec<_>>())
+                    transform.apply(&next.iter().zip(before).map(|(next, before)| next - before).collect::<Vec<_>>())
                 };
                 let change: Vec<Spectrum> = after.iter().zip(&w).map(change).collect();
                 let moved = parted((0..transform.bins()).map(|k| response[k] * vector(&change, k)), transform);
@@ -543,7 +543,7 @@ impl<const M: usize> Rule<M> {
                     e.iter_mut().zip(moved).for_each(|(e, moved)| *e -= moved);
                 }
                 for (e, sizes) in e.iter().zip(&mut predictions.sizes) {
-                    let size = Size::of(e);
+                    let size = Size::new(e);
                     match sizes.get_mut(trial) {
                         Some(predicted) => predicted.worst = predicted.worst.or_larger(size),
                         None => sizes.push(Predicted { nominal: size, worst: size }),

@@ -199,7 +199,7 @@ struct Planner<'a> {
 impl Planner<'_> {
     fn planned(&self, motion: &Move, place: usize) -> Result<Planned> {
         let impossible = |what: String| Error::new(format!("the move \"{}\": there is no plan: {what}", motion.name));
-        let way = MovePath::of(&motion.profiles).ok_or_else(|| impossible("it has no stroke".into()))?;
+        let way = MovePath::new(&motion.profiles).ok_or_else(|| impossible("it has no stroke".into()))?;
         let machine = &self.family.machine;
         let mut short = motion.shortfalls(machine, self.design);
         let quickest = Quickest { machine, design: self.design, modes: self.modes, wanted: self.wanted };
@@ -276,7 +276,7 @@ impl Planner<'_> {
                 match self.slowed(search, periods, share, limits, &machine)? {
                     Ok((limits, ran)) => {
                         let duration = Profile::last_end(&search.way.within(&limits)?);
-                        tried.push(Tried { limits, periods, share, arrival: Arrival::of(duration, &ran) });
+                        tried.push(Tried { limits, periods, share, arrival: Arrival::new(duration, &ran) });
                     }
                     Err(short) => refused = Some(short),
                 }
@@ -375,7 +375,7 @@ impl Planner<'_> {
             profiles,
             until: Profile::last_rest(&self.design.shaped(profiles)) + watched,
             window: motion.window,
-            solver: Solver::of(machine),
+            solver: Solver::for_machine(machine),
         })?;
         let settling = run.figures.settling.filter(|_| run.outcome.ending == Ending::Complete);
         Ok(Ran {
@@ -388,7 +388,7 @@ impl Planner<'_> {
     /// Arrival on the machine of the file alone.
     fn arrival(&self, motion: &Move, profiles: &[Profile]) -> Result<Arrival> {
         let ran = self.run(motion, profiles, &smooth(&self.family.machine))?;
-        Ok(Arrival::of(Profile::last_end(profiles), &ran))
+        Ok(Arrival::new(Profile::last_end(profiles), &ran))
     }
 
     /// The same with the whole family, and the machine that arrives last.
@@ -433,7 +433,7 @@ impl Planner<'_> {
     fn bound(&self, way: &MovePath) -> Option<f64> {
         let [mut from] = way.start[..] else { return None };
         let limits = limits(&self.family.machine, self.design.bounds());
-        let rigid = Rigid::of(&self.family.machine);
+        let rigid = Rigid::new(&self.family.machine);
         let mut time = 0.0;
         for leg in &way.legs {
             match leg {
@@ -451,7 +451,7 @@ impl Planner<'_> {
 
 impl Arrival {
     /// That of a run on the machine of the file alone.
-    fn of(duration: f64, ran: &Ran) -> Self {
+    fn new(duration: f64, ran: &Ran) -> Self {
         Self {
             duration,
             nominal: ran.arrives,

@@ -18,7 +18,7 @@ pub struct Destination {
 
 impl Destination {
     /// Place of a path: a file if it ends in `ending`, else a folder with files named `own`.
-    pub fn of(path: &Path, ending: &str, own: &str) -> Self {
+    pub fn new(path: &Path, ending: &str, own: &str) -> Self {
         let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         match path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending)) {
             true => {

@@ -26,7 +26,7 @@ pub(super) enum Node {
 }
 
 impl Expr {
-    fn of(node: Node) -> Self {
+    fn new(node: Node) -> Self {
         Self(Rc::new(node))
     }
 
@@ -54,7 +54,7 @@ impl Operator {
         }
     }
 
-    fn of(self, a: f64, b: f64) -> f64 {
+    fn apply(self, a: f64, b: f64) -> f64 {
         match self {
             Operator::Plus => a + b,
             Operator::Minus => a - b,
@@ -203,7 +203,7 @@ impl Tape {
     fn two(&self, operator: Operator, a: usize, b: usize) -> Term<'_> {
         match (operator, self.step(a).known(), self.step(b).known()) {
             // Two numbers are joined now, as they would be later.
-            (_, Some(a), Some(b)) => self.number(operator.of(a, b)),
+            (_, Some(a), Some(b)) => self.number(operator.apply(a, b)),
             (Operator::Times, Some(1.0), None) => Term { tape: self, place: b },
             (Operator::Times | Operator::Over, None, Some(1.0)) => Term { tape: self, place: a },
             _ => self.put(Step::Two(operator, a, b)),
@@ -463,16 +463,16 @@ impl Pages<'_> {
     /// A node as an expression.
     fn expression(&self, place: usize) -> Expr {
         if let Some(name) = self.variables.get(&place) {
-            return Expr::of(Node::Variable(name.clone()));
+            return Expr::new(Node::Variable(name.clone()));
         }
         match self.written.steps[place] {
-            Step::Number(bits) => Expr::of(Node::Number(f64::from_bits(bits))),
-            Step::Minus(a) => Expr::of(Node::Minus(self.expression(a))),
-            Step::Two(operator, a, b) => Expr::of(Node::Two(operator, self.expression(a), self.expression(b))),
-            Step::Whole(a) => Expr::of(Node::Whole(self.expression(a))),
+            Step::Number(bits) => Expr::new(Node::Number(f64::from_bits(bits))),
+            Step::Minus(a) => Expr::new(Node::Minus(self.expression(a))),
+            Step::Two(operator, a, b) => Expr::new(Node::Two(operator, self.expression(a), self.expression(b))),
+            Step::Whole(a) => Expr::new(Node::Whole(self.expression(a))),
             // These have variables.
             Step::Input(_) | Step::State(_) | Step::Choose(..) | Step::Cell(..) | Step::Neighbour(..) => {
-                Expr::of(Node::Number(f64::NAN))
+                Expr::new(Node::Number(f64::NAN))
             }
         }
     }
@@ -522,7 +522,7 @@ impl Pages<'_> {
     fn assign(&self, variable: &str, place: usize, statements: &mut Vec<Statement>) {
         match self.written.steps[place] {
             Step::Choose(of, relation, than, yes, no) if !self.variables.contains_key(&place) => {
-                let than = Expr::of(Node::Number(f64::from_bits(than)));
+                let than = Expr::new(Node::Number(f64::from_bits(than)));
                 let test = Test(RELATIONS[usize::from(relation)], self.expression(of), than);
                 let (mut one, mut other) = (Vec::new(), Vec::new());
                 self.assign(variable, yes, &mut one);
@@ -537,20 +537,20 @@ impl Pages<'_> {
     fn cell(&mut self, place: usize, (table, row, column): (usize, usize, usize), statements: &mut Vec<Statement>) {
         let names = NEIGHBOURS.map(|name| self.local(name));
         for (k, name) in names.iter().enumerate() {
-            statements.push(Statement::Set(name.clone(), Expr::of(Node::Number(0.0))));
+            statements.push(Statement::Set(name.clone(), Expr::new(Node::Number(0.0))));
             if let Some(&own) = self.written.places.get(&Step::Neighbour(place, k)) {
                 self.variables.insert(own, name.clone());
             }
         }
         let rules = &self.written.tables[table];
         let is = |at: usize, k: usize| {
-            let half = Expr::of(Node::Number(k as f64 - 0.25));
+            let half = Expr::new(Node::Number(k as f64 - 0.25));
             Test(Relation::AtLeast, self.expression(at), half)
         };
         let set = |i: usize, j: usize| {
             let corners = names.iter().zip([(0, 0), (0, 1), (1, 0), (1, 1)]);
             let one = |(name, (di, dj)): (&String, (usize, usize))| {
-                Statement::Set(name.clone(), Expr::of(Node::Number(rules[i + di][j + dj])))
+                Statement::Set(name.clone(), Expr::new(Node::Number(rules[i + di][j + dj])))
             };
             Statement::If(is(column, j), corners.map(one).collect(), Vec::new())
         };

@@ -321,7 +321,7 @@ impl Tables {
     /// Codes of the elements at rest at the origin without an input.
     pub fn at_rest(&self) -> Vec<usize> {
         let mode = self.mechanism.first_mode(&State::default());
-        self.elements.iter().map(|element| element.code(element.kind.of(&mode))).collect()
+        self.elements.iter().map(|element| element.code(element.kind.action(&mode))).collect()
     }
 
     /// Number of rows in all tables.
@@ -357,7 +357,7 @@ fn curved(mechanism: &Mechanism) -> Error {
 
 impl ElementKind {
     /// The thing it does in a mode.
-    fn of(self, mode: &Mode) -> Does {
+    fn action(self, mode: &Mode) -> Does {
         match self {
             ElementKind::Body(body) => Does::Moves(mode.motion[body]),
             ElementKind::GearTorque(drive) => Does::Torque(mode.drive[drive].torque_positive),

@@ -13,7 +13,7 @@ fn derivative(unit: &Unit, pointer: *mut std::ffi::c_void, unknown: &str, known:
 
 #[test]
 fn rates_and_forces_change_as_the_paper_says() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let one = unit.exchange();
     one.start();
     let (mut flags, mut next) = ([0u8; 5], 0.0);
@@ -71,7 +71,7 @@ fn outputs_go_on_as_their_derivatives_say() {
         ("h-frame/h-frame.toml", "left_command", 6.0, false, 0.05),
         ("sollmann-jouaneh/controllers/pid.toml", "reference", 0.01, true, 0.0502),
     ] {
-        let unit = Unit::of(case, inside);
+        let unit = Unit::new(case, inside);
         let one = unit.three(false, false);
         one.start();
         assert_eq!(one.set(input, value), OK);
@@ -105,7 +105,7 @@ fn outputs_go_on_as_their_derivatives_say() {
 
 #[test]
 fn derivatives_that_there_are_none_of_are_refused() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let one = unit.three(false, false);
     one.start();
     one.step(0.0, 0.01);
@@ -115,7 +115,7 @@ fn derivatives_that_there_are_none_of_are_refused() {
     }
     assert_eq!(of_output(&one, "cart_state", 1), Err(ERROR), "it is a whole number");
     // The curves of a machine's friction have no table of derivatives; its description says so.
-    let curved = Unit::of("core-xy/follows.toml", false);
+    let curved = Unit::new("core-xy/follows.toml", false);
     let one = curved.three(false, false);
     one.start();
     one.step(0.0, 0.01);

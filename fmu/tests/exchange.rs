@@ -129,7 +129,7 @@ impl<'i, 'u> Importer<'i, 'u> {
 
 #[test]
 fn an_integrator_finds_every_event_of_the_pulse() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let case = Case::read(machine("sollmann-jouaneh/table4.toml")).unwrap();
     let solution = solve::simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap();
     let wanted = solution.trajectory.get("cart_position").unwrap();
@@ -180,7 +180,7 @@ fn an_integrator_bends_bristles() {
 fn an_indicator_that_is_exactly_zero_is_an_event() {
     for (name, column) in [("drive_speed", "drive_state"), ("idler_speed", "idler_state"), ("cart_speed", "cart_state")]
     {
-        let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+        let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
         let one = unit.exchange();
         let mut importer = Importer::new(&one);
         assert_eq!(one.set("command", 5.0), OK);
@@ -211,7 +211,7 @@ fn an_indicator_that_is_exactly_zero_is_an_event() {
 
 #[test]
 fn conditions_are_residuals_and_no_signs() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let one = unit.exchange();
     let mut importer = Importer::new(&one);
     // Held: what is left of 0.015 N m on either side of the drive pulley, K_t u/R = 3.2e-3 N m being on it.

@@ -161,11 +161,11 @@ impl Session<'_> {
 fn random_sequences_of_calls_end_well() {
     let wanted: u64 = std::env::var("TAUT_SEQUENCES").ok().and_then(|count| count.parse().ok()).unwrap_or(200);
     let units = [
-        Unit::of("sollmann-jouaneh/table4.toml", false),
-        Unit::of("core-xy/core-xy.toml", false),
-        Unit::of("core-xy/follows.toml", false),
-        Unit::of("dual-belt/dual-belt.toml", false),
-        Unit::of("sollmann-jouaneh/controllers/pid.toml", true),
+        Unit::new("sollmann-jouaneh/table4.toml", false),
+        Unit::new("core-xy/core-xy.toml", false),
+        Unit::new("core-xy/follows.toml", false),
+        Unit::new("dual-belt/dual-belt.toml", false),
+        Unit::new("sollmann-jouaneh/controllers/pid.toml", true),
         Unit::with("sollmann-jouaneh/table4.toml", &["travel={ min = \"-1 mm\", max = \"1 mm\" }"], false),
     ];
     for sequence in 0..wanted {

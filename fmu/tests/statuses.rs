@@ -6,7 +6,7 @@ use taut_fmu::{fmi2, fmi3};
 
 #[test]
 fn functions_out_of_order_are_errors() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let instance = unit.three(false, false);
     let c = instance.pointer;
     let mut x = [0.0; 6];
@@ -40,7 +40,7 @@ fn functions_out_of_order_are_errors() {
 
 #[test]
 fn unknown_references_wrong_types_and_nulls_are_errors() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let instance = unit.three(false, false);
     instance.start();
     let (c, mut real, mut whole) = (instance.pointer, 0.0, 0);
@@ -72,7 +72,7 @@ fn unknown_references_wrong_types_and_nulls_are_errors() {
 
 #[test]
 fn what_is_no_number_is_an_error_and_changes_nothing() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let instance = unit.three(false, false);
     instance.start();
     assert_eq!(instance.set("command", 3.0), OK);
@@ -101,7 +101,7 @@ fn what_is_no_number_is_an_error_and_changes_nothing() {
 
 #[test]
 fn steps_of_no_size_backward_and_from_elsewhere_are_errors() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let instance = unit.three(false, false);
     unsafe {
         assert_eq!(fmi3::fmi3EnterInitializationMode(instance.pointer, 0, 0.0, 0.0, 1, 0.5), OK);
@@ -119,7 +119,7 @@ fn steps_of_no_size_backward_and_from_elsewhere_are_errors() {
 
 #[test]
 fn another_token_or_no_resources_make_no_instance() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let wrong = CString::new("{0}").unwrap();
     assert!(unit.two(1, &wrong).is_null());
     assert!(unit.two(7, &unit.token()).is_null());

@@ -78,7 +78,7 @@ fn worst(instance: &Three, ends: &[f64], random: &mut Random, expected: &[[f64; 
 
 #[test]
 fn a_hundred_random_sequences_of_steps_end_where_the_solver_does() {
-    let (unit, expected) = (Unit::of("sollmann-jouaneh/table4.toml", false), expected());
+    let (unit, expected) = (Unit::new("sollmann-jouaneh/table4.toml", false), expected());
     let mut random = Random(17);
     let mut most: f64 = 0.0;
     for sequence in 0..100 {
@@ -98,7 +98,7 @@ fn a_hundred_random_sequences_of_steps_end_where_the_solver_does() {
 
 #[test]
 fn events_end_steps_only_where_the_importer_asked_for_both() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     for (events, early, stops) in
         [(false, false, false), (false, true, false), (true, false, false), (true, true, true)]
     {
@@ -120,7 +120,7 @@ fn events_end_steps_only_where_the_importer_asked_for_both() {
 
 #[test]
 fn ramps_of_inputs_are_exact_and_not_stairs() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let case = Case::from_text(
         "ramp.toml",
         &std::fs::read_to_string(machine("sollmann-jouaneh/table4.toml")).unwrap().replacen(
@@ -158,7 +158,7 @@ fn a_state_as_bytes_goes_on_bit_for_bit_in_another_instance() {
         ("dual-belt/dual-belt.toml", "cart_command"),
         ("emps/emps.toml", "command"),
     ] {
-        let unit = Unit::of(case, false);
+        let unit = Unit::new(case, false);
         let (one, two) = (unit.three(false, false), unit.three(false, false));
         one.start();
         two.start();
@@ -243,7 +243,7 @@ fn four_threads_do_not_disturb_each_other() {
             let expected = &expected;
             scope.spawn(move || {
                 // Two kinds of machines at once.
-                let unit = Unit::of(cases[thread as usize % 2], false);
+                let unit = Unit::new(cases[thread as usize % 2], false);
                 let mut random = Random(thread);
                 for _ in 0..5 {
                     let instance = unit.three(false, false);
@@ -270,7 +270,7 @@ fn a_force_on_the_cart_does_what_a_load_does() {
         ("sollmann-jouaneh/table4.toml", "cart_force", Some("cart.load=4 N")),
         ("core-xy/core-xy.toml", "cart_force", None),
     ] {
-        let (pushed, loaded) = (Unit::of(case, false), Unit::with(case, load.as_slice(), false));
+        let (pushed, loaded) = (Unit::new(case, false), Unit::with(case, load.as_slice(), false));
         let (one, two) = (pushed.three(false, false), loaded.three(false, false));
         one.start();
         two.start();
@@ -295,7 +295,7 @@ fn a_force_on_the_cart_does_what_a_load_does() {
 
 #[test]
 fn a_load_picked_up_under_way_is_a_tunable_mass() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let heavy = Unit::with("sollmann-jouaneh/table4.toml", &["cart.mass=0.9 kg"], false);
     let (one, two, light) = (unit.three(false, false), heavy.three(false, false), unit.three(false, false));
     for instance in [&one, &two, &light] {
@@ -334,7 +334,7 @@ fn gantries_and_general_stages_end_where_their_solver_does() {
         };
         let solver = Solver::of_mechanism(&mechanism);
         solve::stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), &mut keep).unwrap();
-        let unit = Unit::of(name, false);
+        let unit = Unit::new(name, false);
         let instance = unit.three(false, false);
         instance.start();
         for (side, value) in commands {
@@ -377,7 +377,7 @@ unsafe extern "C" fn keep_time(
 
 #[test]
 fn the_callback_within_a_step_sees_events_and_may_end_it() {
-    let unit = Unit::of("sollmann-jouaneh/table4.toml", false);
+    let unit = Unit::new("sollmann-jouaneh/table4.toml", false);
     let mut times: Vec<f64> = Vec::new();
     let instance = unit.three_with(false, true, (&raw mut times).cast(), Some(keep_time));
     instance.start();

@@ -20,7 +20,7 @@ pub struct Unit {
 
 impl Unit {
     /// That of a case in `stages`.
-    pub fn of(case: &str, with_controller: bool) -> Self {
+    pub fn new(case: &str, with_controller: bool) -> Self {
         Self::with(case, &[], with_controller)
     }
 

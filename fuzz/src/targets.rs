@@ -101,11 +101,11 @@ fn gantry(name: &Path, case: &Case) -> Reached {
     let again = Case::from_text_with(name, &case.text, &[]);
     let again = again.unwrap_or_else(|error| panic!("its own text is refused: {error}"));
     assert!(again.text == case.text && again.machine == case.machine, "its own text reads otherwise");
-    let Ok(analysis) = Analysis::of(case, &Question::default()) else { return Reached::Read };
+    let Ok(analysis) = Analysis::new(case, &Question::default()) else { return Reached::Read };
     let fastest = analysis.poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
     let (Some(experiment), true) = (case.experiments.first(), fastest.is_finite()) else { return Reached::Read };
     let mechanism = case.machine.mechanism();
-    let mut course = Course::of(&mechanism, experiment);
+    let mut course = Course::new(&mechanism, experiment);
     course.until = course.until.min(LONGEST.min(PHASE / fastest.max(1e-300)));
     course.every = course.every.min(course.until).max(course.until / ROWS);
     let mut meter = Meter::new(&case.machine, experiment);
@@ -126,7 +126,7 @@ fn gantry(name: &Path, case: &Case) -> Reached {
 
 /// How long a machine may run, s; none where its equations say nothing.
 fn longest(stage: &Machine) -> Option<f64> {
-    let poles = StateSpace::of(stage, Operation::default()).and_then(|model| model.poles()).ok()?;
+    let poles = StateSpace::new(stage, Operation::default()).and_then(|model| model.poles()).ok()?;
     let fastest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
     fastest.is_finite().then(|| LONGEST.min(PHASE / fastest.max(1e-300)))
 }
@@ -136,7 +136,7 @@ fn run(stage: &Machine, experiment: &Experiment, longest: f64) {
     let every = experiment.every.min(until).max(until / ROWS);
     let short = Experiment { until, every, ..experiment.clone() };
     let mut finite = true;
-    let outcome = solve::stream(stage, &short, Solver::of(stage), &mut |rows| {
+    let outcome = solve::stream(stage, &short, Solver::for_machine(stage), &mut |rows| {
         for name in ["time", "cart_position", "drive_angle"] {
             finite &= rows.get(name).is_some_and(|values| values.iter().all(|value| value.is_finite()));
         }
@@ -163,7 +163,7 @@ fn drive(stage: &Machine, design: &taut::design::Design, motion: &Move, longest:
     let rows = Rows { until, every: motion.every.min(until).max(until / ROWS), window: motion.window };
     let done = Standard::of_drives(design, stage).and_then(|mut controllers| {
         let profiles = motion.references(design);
-        let (timing, solver) = (Loop::of(design), Solver::of(stage));
+        let (timing, solver) = (Loop::new(design), Solver::for_machine(stage));
         let controllers = &mut each(&mut controllers);
         taut::control::stream(stage, controllers, &timing, &profiles, &rows, solver, false, &mut |_| Flow::Continue)
     });

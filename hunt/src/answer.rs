@@ -88,7 +88,7 @@ pub(crate) fn solved(subject: &Subject, solver: Solver) -> Result<Answer, String
         }
         Subject::Gantry(case) => {
             let mechanism = case.machine.mechanism();
-            let course = Course::of(&mechanism, &case.experiments[0]);
+            let course = Course::new(&mechanism, &case.experiments[0]);
             let outcome =
                 stream_mechanism(&mechanism, &course, solver, (Detail::Full, None), &mut keep).map_err(told)?;
             let estimate = ErrorEstimate::of_mechanism(&mechanism, &course);

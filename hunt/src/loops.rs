@@ -166,7 +166,7 @@ enum LoopKind {
 
 impl Law {
     fn new(design: &Design, machine: &Machine) -> Result<Self, String> {
-        let rigid = Rigid::of(machine);
+        let rigid = Rigid::new(machine);
         let own = design.filters.is_empty()
             && design.disturbance_observer.is_none()
             && design.shaper.is_empty()
@@ -358,7 +358,7 @@ struct Rigid {
 }
 
 impl Rigid {
-    fn of(machine: &Machine) -> Self {
+    fn new(machine: &Machine) -> Self {
         let (r, motor) = (machine.pulley_radius, &machine.drives[0].motor);
         let (j1, j2, n) = (machine.drive_pulley.inertia, machine.idler_pulley.inertia, motor.gear_ratio);
         // M = m + (J₁ + n² J_r + J₂)/r²

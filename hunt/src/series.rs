@@ -315,14 +315,14 @@ impl Noise {
                 break;
             }
             for (place, row) in &rates.rows {
-                noise.states[k + 1][*place] = noise.of(row, k) * h / (k + 1) as f64;
+                noise.states[k + 1][*place] = noise.deviation(row, k) * h / (k + 1) as f64;
             }
         }
         noise
     }
 
     /// Of term k of a form.
-    pub fn of(&self, row: &Row, k: usize) -> f64 {
+    pub fn deviation(&self, row: &Row, k: usize) -> f64 {
         let (terms, input) = &self.terms[k];
         let one = if k == 0 { 4.0 * ROUNDING * row.one.high.abs() } else { 0.0 };
         row.most(&self.states[k], &[0.0; DRIVES]) + row.most(terms, input) + one

@@ -306,7 +306,7 @@ impl<'a, 'b> Solver<'a, 'b> {
             let noise = noise.get_or_insert_with(|| Noise::new(&law.rates, series, h.high, &self.size));
             // What is zero but for rounding is zero.
             for (k, c) in c.iter_mut().enumerate() {
-                if c.high.abs() > noise.of(row, k) {
+                if c.high.abs() > noise.deviation(row, k) {
                     break;
                 }
                 *c = Double::ZERO;
@@ -372,7 +372,7 @@ impl<'a, 'b> Solver<'a, 'b> {
             }
             let noise = noise.get_or_insert_with(|| Noise::new(&law.rates, &series, h.high, &self.size));
             let c = series.polynomial(&guard.row);
-            let told = c.iter().enumerate().find(|&(k, c)| c.high.abs() > noise.of(&guard.row, k));
+            let told = c.iter().enumerate().find(|&(k, c)| c.high.abs() > noise.deviation(&guard.row, k));
             told.is_some_and(|(_, c)| *c < Double::ZERO)
         };
         let guard = law.guards.iter().find(broken)?;

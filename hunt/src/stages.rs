@@ -217,7 +217,7 @@ struct Line {
 }
 
 impl Line {
-    fn of<'a>(name: &str, compared: impl Iterator<Item = &'a Compared>) -> Self {
+    fn new<'a>(name: &str, compared: impl Iterator<Item = &'a Compared>) -> Self {
         let mut line = Self { name: name.into(), ..Self::default() };
         for compared in compared {
             line.stages += 1;
@@ -260,14 +260,14 @@ fn lines(outcomes: &[Outcome]) -> Vec<Line> {
     if outcomes.iter().any(|outcome| !outcome.features.is_empty()) {
         let of_feature = |feature: Feature| {
             let having = outcomes.iter().filter(move |outcome| outcome.features.contains(&feature));
-            Line::of(feature.names()[0], having.flat_map(|outcome| &outcome.compared))
+            Line::new(feature.names()[0], having.flat_map(|outcome| &outcome.compared))
         };
-        let whole = Line::of("all", outcomes.iter().flat_map(|outcome| &outcome.compared));
+        let whole = Line::new("all", outcomes.iter().flat_map(|outcome| &outcome.compared));
         return std::iter::once(whole).chain(Feature::ALL.map(of_feature)).collect();
     }
-    let mut lines = vec![Line::of("all", all(By::Exact, None).iter())];
-    lines.extend(StageKind::ALL.map(|kind| Line::of(kind.name(), all(By::Exact, Some(kind)).iter())));
-    lines.push(Line::of("all, by the general solver", all(By::General, None).iter()));
+    let mut lines = vec![Line::new("all", all(By::Exact, None).iter())];
+    lines.extend(StageKind::ALL.map(|kind| Line::new(kind.name(), all(By::Exact, Some(kind)).iter())));
+    lines.push(Line::new("all, by the general solver", all(By::General, None).iter()));
     lines
 }
 

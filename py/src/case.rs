@@ -211,7 +211,7 @@ impl Case {
         let text = guarded(|| fit.case_text(case, &self.path))?.told(py)?;
         let estimated = Self::from_text(py, self.path.clone(), &text, Vec::new())?;
         let told = guarded(|| json::fit(case, &fit, &profiles, drawn.as_ref().map(json::posterior)))?;
-        let draws = drawn.map(|drawn| Columns::of(py, drawn.table())).transpose()?;
+        let draws = drawn.map(|drawn| Columns::new(py, drawn.table())).transpose()?;
         let logs = fit.logs.into_iter().map(|log| logs::met(py, log)).collect::<PyResult<_>>()?;
         Ok(Fit { data: value::json(py, &told)?.unbind(), case: Py::new(py, estimated)?, draws, logs })
     }
@@ -227,7 +227,7 @@ impl Case {
         delay: Option<f64>,
     ) -> PyResult<Bound<'py, PyAny>> {
         let case = &self.inner;
-        let (cut, known) = (Cut { segment, period }, Known::of(case, at, bridge, delay).told(py)?);
+        let (cut, known) = (Cut { segment, period }, Known::new(case, at, bridge, delay).told(py)?);
         let found = unlocked(py, || measure(case, &cut, known))?.map_err(|error| error.in_file(&self.path)).told(py)?;
         value::json(py, &guarded(|| json::frf(case, &found))?)
     }
@@ -448,13 +448,13 @@ impl Case {
         to: Option<f64>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let question = modes::question(at, bridge, speed, &stuck, sample_time, hold, delay, from, to)?;
-        let analysis = unlocked(py, || Analysis::of(&self.inner, &question))?.told(py)?;
+        let analysis = unlocked(py, || Analysis::new(&self.inner, &question))?.told(py)?;
         modes::answers(py, &analysis)
     }
 
     /// The overview, as `taut show --json` has it.
     fn show<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let overview = unlocked(py, || Overview::of(&self.inner))?.told(py)?;
+        let overview = unlocked(py, || Overview::new(&self.inner))?.told(py)?;
         value::json(py, &guarded(|| json::show(&overview))?)
     }
 
@@ -475,7 +475,7 @@ impl Case {
         let made = unlocked(py, || {
             let inputs = inputs(&opened.files);
             let text = |target: Target| {
-                let place = Destination::of(&out, target.ending(), &own);
+                let place = Destination::new(&out, target.ending(), &own);
                 let mut claim = place.claim(target.ending())?;
                 let exported = export(opened, target, &place.stem, &options)?;
                 Ok((place.write(&exported, &inputs, &mut claim)?, exported.notes))
@@ -486,13 +486,13 @@ impl Case {
                 "matlab" => text(Target::Matlab),
                 "python" => text(Target::Python),
                 "fmu" => {
-                    let place = Destination::of(&out, "fmu", &own);
+                    let place = Destination::new(&out, "fmu", &own);
                     let mut claim = place.claim("fmu")?;
                     let exported = fmu::export(opened, options.part, fmi, &place.stem)?;
                     Ok((place.write(&exported, &inputs, &mut claim)?, exported.notes))
                 }
                 "json" => {
-                    let place = Destination::of(&out, "json", &own);
+                    let place = Destination::new(&out, "json", &own);
                     let mut claim = place.claim("json")?;
                     let content = json::text(&json::export(opened)?).into_bytes();
                     let files = vec![(format!("{}.json", place.stem), content)];

@@ -19,7 +19,7 @@ pub struct Columns {
 
 impl Columns {
     /// Hands the columns over.
-    pub fn of(py: Python<'_>, trajectory: Trajectory) -> PyResult<Self> {
+    pub fn new(py: Python<'_>, trajectory: Trajectory) -> PyResult<Self> {
         let (arrays, names) = (PyDict::new(py), PyList::empty(py));
         let mut addresses = Vec::with_capacity(trajectory.columns.len());
         for column in trajectory.columns {

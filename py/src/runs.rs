@@ -221,7 +221,7 @@ fn one(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver
         });
         let found = outcome.and_then(|outcome| {
             let metrics = meter.finish(&outcome.events);
-            let reduction = Reduction::of(machine, experiment, solver)?;
+            let reduction = Reduction::new(machine, experiment, solver)?;
             Ok((trajectory, outcome, metrics, reduction))
         });
         (found, begin.elapsed().as_secs_f64())
@@ -232,7 +232,7 @@ fn one(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver
     let index = case.experiments.iter().position(|other| std::ptr::eq(other, experiment)).unwrap_or_default();
     let metrics = Box::new(metrics);
     let what = What::Experiment { case: Arc::clone(case), index, solver, outcome, metrics, reduction };
-    Ok(Run { columns: Columns::of(py, trajectory)?, what, took })
+    Ok(Run { columns: Columns::new(py, trajectory)?, what, took })
 }
 
 /// The timing of a loop with a controller in Python, where it is not the case's.
@@ -254,8 +254,8 @@ pub fn motion(
     share: Option<f64>,
 ) -> PyResult<Vec<Run>> {
     let (design, moves) = case.moves_named(path, names).told(py)?;
-    let (machine, solver) = (&case.machine, Solver::of(&case.machine));
-    let usual = Loop::of(design);
+    let (machine, solver) = (&case.machine, Solver::for_machine(&case.machine));
+    let usual = Loop::new(design);
     let timing = Loop {
         every: every.unwrap_or(usual.every),
         delay: delay.unwrap_or(usual.delay),
@@ -322,7 +322,7 @@ pub fn motion(
         let index = case.moves.iter().position(|other| std::ptr::eq(other, motion)).unwrap_or_default();
         let (case, structure) = (Arc::clone(case), structure.clone());
         let what = What::Move { case, index, run: Box::new(run), worst, structure, timing };
-        runs.push(Run { columns: Columns::of(py, trajectory)?, what, took });
+        runs.push(Run { columns: Columns::new(py, trajectory)?, what, took });
     }
     Ok(runs)
 }

@@ -48,7 +48,7 @@ impl Sweep {
         let interrupt = Interrupt::listen();
         let table = unlocked(py, || self.table(first, count, threads, &interrupt));
         interrupt.finish()?;
-        let columns = Columns::of(py, table?.map_err(PyRuntimeError::new_err)?)?;
+        let columns = Columns::new(py, table?.map_err(PyRuntimeError::new_err)?)?;
         Ok((columns.arrays, columns.names))
     }
 }

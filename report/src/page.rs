@@ -35,7 +35,7 @@ struct SharedAxis {
 
 impl SharedAxis {
     /// The axis of a figure; none where a zoom of x is one of y, too.
-    fn of(figure: &Figure) -> Option<Self> {
+    fn new(figure: &Figure) -> Option<Self> {
         let (x, _) = layout::scales(figure);
         let (heading, log, range) = (figure.x.heading(), figure.x.log, (x.lo, x.hi));
         (!figure.equal && !heading.is_empty()).then_some(Self { heading, log, range })
@@ -286,7 +286,7 @@ impl Page {
     pub fn figure(&mut self, figure: &Figure) {
         self.figures += 1;
         let svg = strip_style(&plot::svg(figure, false));
-        let axis = SharedAxis::of(figure).map(|axis| self.shared(axis));
+        let axis = SharedAxis::new(figure).map(|axis| self.shared(axis));
         self.push(html! {
             figure.plot data-axis=[axis] {
                 div.figtitle { span { (figure.title) } button type="button" { "Reset zoom" } }

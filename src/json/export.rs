@@ -19,7 +19,7 @@ pub fn export(case: &Case) -> Result<Value> {
         true => Some(equations(&Tables::new(&mechanism)?)),
         false => None,
     };
-    let linear = linear(&System::of(&case.machine, Operation::default())?);
+    let linear = linear(&System::new(&case.machine, Operation::default())?);
     Ok(json!({
         "schema": super::identity("export"),
         "title": case.title.as_str(),

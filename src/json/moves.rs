@@ -123,7 +123,7 @@ pub fn motion(done: &Moved) -> Value {
         "position_error_m": run.outcome.error.map(|error| error.value),
         "position_error_basis": run.outcome.error.map(|_| Accuracy::basis(done.machine)),
         "is_determined": is_determined(&run.outcome),
-        "decided_within_rounding": TieTold::of(&run.outcome),
+        "decided_within_rounding": TieTold::from_outcome(&run.outcome),
         "trouble": done.trouble.map(|trouble| json!({
             "kind": trouble.kind.word(), "frequency_Hz": trouble.frequency, "cause": trouble.cause, "words": trouble.words,
         })),

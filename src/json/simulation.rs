@@ -210,19 +210,19 @@ impl Simulation {
             title: case.title.clone(),
             version: env!("CARGO_PKG_VERSION"),
             kind: case.machine.kind.word(),
-            solver: SolverUsed::of(solver),
-            machine: MachineFigures::of(&case.machine),
-            stage: case.is_axis().then(|| StageFigures::of(&case.machine)),
+            solver: SolverUsed::new(solver),
+            machine: MachineFigures::new(&case.machine),
+            stage: case.is_axis().then(|| StageFigures::new(&case.machine)),
             experiments: runs
                 .iter()
-                .map(|run| ExperimentFigures::of(run, (&case.machine, &mechanism), solver))
+                .map(|run| ExperimentFigures::new(run, (&case.machine, &mechanism), solver))
                 .collect(),
         }
     }
 }
 
 impl SolverUsed {
-    pub(super) fn of(solver: Solver) -> Self {
+    pub(super) fn new(solver: Solver) -> Self {
         match solver {
             Solver::Exact => Self { name: "exact", tolerance: None, step_s: None, method: None },
             Solver::General { tolerance } => {
@@ -240,7 +240,7 @@ impl SolverUsed {
 }
 
 impl MachineFigures {
-    fn of(machine: &Machine) -> Self {
+    fn new(machine: &Machine) -> Self {
         let of_motors = |number: fn(&Motor) -> f64| machine.drives.iter().map(|unit| number(&unit.motor)).collect();
         let geometry = machine.geometry();
         let mass = |(at, slide): (&crate::machine::SlideAt, &crate::machine::Slide)| {
@@ -264,7 +264,7 @@ impl MachineFigures {
 }
 
 impl StageFigures {
-    fn of(machine: &Machine) -> Self {
+    fn new(machine: &Machine) -> Self {
         let (n, r) = (machine.drives[0].motor.gear_ratio, machine.pulley_radius);
         let rotor = n * n * machine.drives[0].motor.rotor_inertia;
         let (j1, j2, m) = (machine.drive_pulley.inertia, machine.idler_pulley.inertia, machine.cart.mass);
@@ -282,12 +282,12 @@ impl StageFigures {
 }
 
 impl ExperimentFigures {
-    fn of(run: &Simulated, (machine, mechanism): (&Machine, &Mechanism), solver: Solver) -> Self {
+    fn new(run: &Simulated, (machine, mechanism): (&Machine, &Mechanism), solver: Solver) -> Self {
         let (metrics, outcome) = (run.metrics, run.outcome);
         Self {
             name: run.experiment.name.clone(),
             files: run.files.to_vec(),
-            ending: EndingTold::of(outcome, metrics.end),
+            ending: EndingTold::new(outcome, metrics.end),
             metrics: figures(metrics, machine),
             reduction: run.reduction.map(|reduction| ReductionTold {
                 cart: reduction.cart.into(),
@@ -301,17 +301,17 @@ impl ExperimentFigures {
             position_error_m: run.outcome.error.map(|error| error.value),
             position_error_basis: error_basis(outcome, solver),
             is_determined: is_determined(outcome),
-            decided_within_rounding: TieTold::of(outcome),
+            decided_within_rounding: TieTold::from_outcome(outcome),
             events: outcome.events.iter().take(MOST_EVENTS).map(|event| Event::on(mechanism, event)).collect(),
             events_not_listed: outcome.events.len().saturating_sub(MOST_EVENTS),
-            cost: CostTold::of(outcome),
+            cost: CostTold::new(outcome),
         }
     }
 }
 
 impl EndingTold {
     /// `end` is when it was, s, where nothing ended it early.
-    pub(super) fn of(outcome: &Outcome, end: f64) -> Self {
+    pub(super) fn new(outcome: &Outcome, end: f64) -> Self {
         let (word, time_s) = super::ending(outcome.ending, end);
         Self { word, time_s }
     }
@@ -325,7 +325,7 @@ pub(super) struct TieTold {
 }
 
 impl TieTold {
-    pub(super) fn of(outcome: &Outcome) -> Vec<Self> {
+    pub(super) fn from_outcome(outcome: &Outcome) -> Vec<Self> {
         outcome.ties.iter().map(|tie| Self { time_s: tie.time, part: tie.part.key() }).collect()
     }
 }
@@ -341,7 +341,7 @@ pub(super) fn error_basis(outcome: &Outcome, solver: Solver) -> Option<&'static 
 }
 
 impl CostTold {
-    pub(super) fn of(outcome: &Outcome) -> Self {
+    pub(super) fn new(outcome: &Outcome) -> Self {
         let cost = outcome.cost;
         Self {
             samples: cost.samples,
@@ -357,7 +357,7 @@ impl CostTold {
 }
 
 impl CountTold {
-    pub(super) fn of(body: &'static str, count: metrics::EventCount) -> Self {
+    pub(super) fn new(body: &'static str, count: metrics::EventCount) -> Self {
         Self { body, stops: count.stops, starts: count.starts, reversals: count.reversals }
     }
 }
@@ -368,11 +368,11 @@ pub fn figures(metrics: &Metrics, machine: &Machine) -> Value {
     let geometry = machine.geometry();
     let mut told = Map::new();
     told.insert("end_time_s".into(), json!(metrics.end));
-    for figure in metrics::figures(machine.kind, Extras::of(machine)) {
-        let value = match figure.of(metrics) {
+    for figure in metrics::figures(machine.kind, Extras::new(machine)) {
+        let value = match figure.value(metrics) {
             Worth::Number(_) if figure.row.seek == Some(Seek::SteadySpeed) => {
                 let steady =
-                    metrics.steady_speed.map(|steady| SteadyTold::of(steady, machine.drives[0].amplifier.mode));
+                    metrics.steady_speed.map(|steady| SteadyTold::new(steady, machine.drives[0].amplifier.mode));
                 json!(steady)
             }
             Worth::Number(value) => super::number(value),
@@ -391,7 +391,8 @@ pub fn figures(metrics: &Metrics, machine: &Machine) -> Value {
             Key::OfBody => {}
         }
     }
-    let counts = geometry.bodies.iter().zip(&metrics.bodies).map(|(body, count)| CountTold::of(body.label.key, *count));
+    let counts =
+        geometry.bodies.iter().zip(&metrics.bodies).map(|(body, count)| CountTold::new(body.label.key, *count));
     told.insert("event_counts".into(), json!(counts.collect::<Vec<_>>()));
     Value::Object(told)
 }
@@ -451,7 +452,7 @@ pub(super) fn figure_lines() -> Vec<[String; 3]> {
             metrics::figures(*kind, *extras).iter().any(|one| one.by_role == name || one.name == name)
         };
         let of_all = |name: &str| machines.iter().all(|machine| has(machine, name));
-        let ends: &[(&str, &str)] = match figure.of(&nothing) {
+        let ends: &[(&str, &str)] = match figure.value(&nothing) {
             Worth::Number(_) if figure.row.seek == Some(Seek::SteadySpeed) => continue,
             Worth::TimeOfPeak(_) => continue,
             Worth::Number(_) if figure.row.seek == Some(Seek::StopTime) => &[("", "number?")],
@@ -485,7 +486,7 @@ impl From<Peak> for PeakTold {
 }
 
 impl SteadyTold {
-    fn of(steady: SteadySpeed, mode: AmplifierMode) -> Self {
+    fn new(steady: SteadySpeed, mode: AmplifierMode) -> Self {
         Self {
             cart_speed_m_s: steady.value,
             change_m_s: steady.change,
@@ -501,7 +502,7 @@ impl SteadyTold {
 
 impl Event {
     /// As the solver found it on an axis.
-    pub fn of(event: &solve::Event) -> Self {
+    pub fn new(event: &solve::Event) -> Self {
         Self::with(event, load_unit)
     }
 

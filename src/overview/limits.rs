@@ -22,7 +22,7 @@ pub(super) fn limits(
     let most = most(bounds.command, inputs);
     let r = machine.pulley_radius;
     let power =
-        |unit: &crate::machine::DriveUnit| Power::of(&unit.motor, &unit.amplifier, r, (most.as_ref(), bounds.current));
+        |unit: &crate::machine::DriveUnit| Power::new(&unit.motor, &unit.amplifier, r, (most.as_ref(), bounds.current));
     let Some(powers) = machine.drives.iter().map(power).collect::<Option<Vec<_>>>() else {
         let text = "nothing bounds the input: give amplifier.voltage_limit or current_limit to see the largest speed and \
                     acceleration";
@@ -143,7 +143,7 @@ fn most<'a>(limit: Option<f64>, inputs: impl Iterator<Item = (&'a Signal, f64)>)
 impl Power {
     /// Of a drive with the largest input that it gets, or none, and the limit of a current loop, A; and what limits it,
     /// in words.
-    pub fn of(
+    pub fn new(
         motor: &Motor,
         amplifier: &Amplifier,
         r: f64,

@@ -33,14 +33,14 @@ pub(super) fn drive(machine: &Machine) -> Group {
     group.add("travel_per_microstep", "travel per microstep", stepper.microstep() * r, "m");
     let stiffness = stepper.teeth() * (torque - 4.0 * stepper.detent_torque) / (r * r);
     group.add("field_stiffness", "stiffness of the field at the belt", stiffness, "N/m").how("N (T_h − 4 T_d)/r²");
-    let mass = PullOut::of(machine).map_or(f64::NAN, |pull_out| pull_out.mass());
+    let mass = PullOut::new(machine).map_or(f64::NAN, |pull_out| pull_out.mass());
     let hertz = (stiffness / mass).sqrt() / (2.0 * PI);
     group.add("field_resonance", "resonance of all on the field", hertz, "Hz").how("as one mass");
     group
 }
 
 pub(super) fn limits(machine: &Machine) -> Option<Group> {
-    let pull_out = PullOut::of(machine)?;
+    let pull_out = PullOut::new(machine)?;
     let mut group = Group::new("limits", "Pull-out torque");
     let r = machine.pulley_radius;
     for (number, speed) in SPEEDS.into_iter().enumerate() {

@@ -42,7 +42,7 @@ pub struct Measure {
 
 impl Measure {
     /// Its value; NaN where a run has none.
-    pub fn of(&self, run: &MoveRun) -> f64 {
+    pub fn value(&self, run: &MoveRun) -> f64 {
         (self.of)(run, self.part)
     }
 }

@@ -24,7 +24,7 @@ impl Sweep {
             Some(Origin::Posterior(file)) => Some(Arc::new(draws(case, plan, file)?)),
             _ => None,
         };
-        let subject = Subject::of(case, plan);
+        let subject = Subject::new(case, plan);
         Self::planned(subject, plan, draws, &case.known)
     }
 

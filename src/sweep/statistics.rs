@@ -29,7 +29,7 @@ const BINS: f64 = 60.0;
 
 impl Spread {
     /// That of these values; none where there is no number among them.
-    pub fn of(values: &[f64]) -> Option<Self> {
+    pub fn new(values: &[f64]) -> Option<Self> {
         let mut sorted: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
         sorted.sort_by(f64::total_cmp);
         let (count, missing) = (sorted.len(), values.len() - sorted.len());
@@ -70,7 +70,7 @@ pub struct Ranked {
 
 impl Ranked {
     /// Ranks these values.
-    pub fn of(values: &[f64]) -> Self {
+    pub fn new(values: &[f64]) -> Self {
         let mut sorted: Vec<usize> = (0..values.len()).filter(|place| values[*place].is_finite()).collect();
         sorted.sort_unstable_by(|a, b| values[*a].total_cmp(&values[*b]));
         let mut order: Vec<(usize, usize)> = Vec::with_capacity(sorted.len());

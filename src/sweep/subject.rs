@@ -29,7 +29,7 @@ pub(super) struct Subject {
 
 impl Subject {
     /// That of a case, as planned.
-    pub fn of(case: &Case, plan: &Sweeping) -> Self {
+    pub fn new(case: &Case, plan: &Sweeping) -> Self {
         let mut experiments = case.experiments.clone();
         for experiment in &mut experiments {
             // What was measured does not count here.
@@ -37,12 +37,12 @@ impl Subject {
             experiment.every = plan.interval.unwrap_or(experiment.every);
         }
         let (machine, moves, controller) = (case.machine.clone(), case.moves.clone(), case.controller.clone());
-        let mut of_experiment = metrics::figures(machine.kind, Extras::of(&machine));
+        let mut of_experiment = metrics::figures(machine.kind, Extras::new(&machine));
         of_experiment.retain(|figure| !(case.is_axis() && figure.row.again_on_an_axis) && plan.tells(&figure.name));
         let mut of_move = measures::of_move(machine.kind);
         of_move.retain(|measure| plan.tells(&measure.name));
         let seeks: Vec<_> = of_experiment.iter().filter_map(metrics::Figure::seek).collect();
-        let sought = Sought::of(&machine, &machine.mechanism(), &seeks);
+        let sought = Sought::new(&machine, &machine.mechanism(), &seeks);
         let beside = plan.solver == Running::Beside && solve::runs_beside(&machine.mechanism(), &experiments);
         Self { machine, experiments, moves, controller, of_experiment, of_move, sought, beside }
     }
@@ -67,7 +67,7 @@ impl Subject {
     /// Refuses a case whose own machine cannot be run.
     pub fn check(&self) -> Result<()> {
         for experiment in &self.experiments {
-            solve::stream(&self.machine, experiment, Solver::of(&self.machine), &mut |_| Flow::Stop)?;
+            solve::stream(&self.machine, experiment, Solver::for_machine(&self.machine), &mut |_| Flow::Stop)?;
         }
         for motion in &self.moves {
             self.close(&self.machine, motion)?;
@@ -83,13 +83,13 @@ impl Subject {
         sink: &mut dyn FnMut(&Trajectory) -> Flow,
     ) -> Result<Outcome> {
         let experiment = self.experiments.get(experiment).ok_or_else(|| Error::new("there is no such experiment"))?;
-        solve::stream(machine, experiment, Solver::of(machine), sink)
+        solve::stream(machine, experiment, Solver::for_machine(machine), sink)
     }
 
     /// Adds status and figures of an experiment.
     fn tell(&self, run: Result<(Outcome, Meter)>, values: &mut Vec<f64>) {
         let told = run.map(|(outcome, meter)| (status(&outcome), meter.finish(&outcome.events)));
-        put_figures(told, &self.of_experiment, |figure, metrics| figure.of(metrics).number(), values);
+        put_figures(told, &self.of_experiment, |figure, metrics| figure.value(metrics).number(), values);
     }
 
     /// A move in closed loop; the controller takes every machine for the one of the case.
@@ -102,7 +102,7 @@ impl Subject {
             profiles: &motion.profiles,
             until: motion.until,
             window: motion.window,
-            solver: Solver::of(machine),
+            solver: Solver::for_machine(machine),
         };
         control::closed_loop(&setup)
     }
@@ -215,7 +215,7 @@ impl<'a> Worker<'a> {
         for motion in &subject.moves {
             let told =
                 mounted.clone().and_then(|()| subject.close(machine, motion)).map(|run| (status(&run.outcome), run));
-            put_figures(told, &subject.of_move, |measure, run| measure.of(run), values);
+            put_figures(told, &subject.of_move, |measure, run| measure.value(run), values);
         }
     }
 }

@@ -110,7 +110,7 @@ impl Page {
             let of = request.body.get("of").and_then(Value::as_u64);
             let stop = of.and_then(|of| self.long.get(&of));
             stop.inspect(|stop| stop.store(true, Ordering::Relaxed));
-            return Some(Reply::of(json!({ "cancelled": stop.is_some() })).frame(Some(request.id)));
+            return Some(Reply::new(json!({ "cancelled": stop.is_some() })).frame(Some(request.id)));
         }
         match taut_acts::pace(&request.act) {
             None => Some(taut_acts::unknown(&request.act).frame(Some(request.id))),
@@ -120,7 +120,7 @@ impl Page {
                 let replaced = same.map(|place| self.waiting.remove(place).id);
                 self.waiting.push(request);
                 self.begin_quick();
-                replaced.map(|id| Reply::of(json!({ "replaced": true })).frame(Some(id)))
+                replaced.map(|id| Reply::new(json!({ "replaced": true })).frame(Some(id)))
             }
         }
     }
@@ -159,7 +159,7 @@ impl Page {
             let id = request.id;
             let tell = |step: Value| {
                 // A page that is behind misses a step, and gets the next.
-                progress.try_send(Reply::of(json!({ "progress": step })).frame(Some(id))).is_ok()
+                progress.try_send(Reply::new(json!({ "progress": step })).frame(Some(id))).is_ok()
             };
             let is_stopped = || stop.load(Ordering::Relaxed);
             let context = Context::new(&*state, &is_stopped, &tell);

@@ -52,7 +52,7 @@ pub struct AtBreak {
 }
 
 impl Loop {
-    pub fn of(case: &Case) -> Self {
+    pub fn new(case: &Case) -> Self {
         let machine = &case.machine;
         // Every number is a count.
         assert!(machine.encoder.iter().chain(&machine.scale).all(|encoder| encoder.lines >= FINE));
@@ -108,7 +108,7 @@ impl Loop {
         };
 
         // The axis: what is held for the rest of the delay, and then for the rest of the sample.
-        let axis = StateSpace::of(&case.machine, Operation::default()).unwrap();
+        let axis = StateSpace::new(&case.machine, Operation::default()).unwrap();
         let n = axis.a.nrows();
         let held = |time: f64| {
             let mut whole = Matrix::zeros(n + 1, n + 1);
@@ -206,7 +206,7 @@ impl Loop {
         grid.retain(|theta| *theta > 1e-7 && *theta <= PI);
         grid.sort_by(f64::total_cmp);
         grid.dedup();
-        let resolvents = [Resolvent::of(&self.a), Resolvent::of(&self.phi)];
+        let resolvents = [Resolvent::new(&self.a), Resolvent::new(&self.phi)];
         let at = |theta: f64| self.parts(&resolvents, theta);
         let all: Vec<(f64, [Complex<f64>; MEASURED])> = grid.iter().map(|&theta| (theta, at(theta))).collect();
         self.breaks().into_iter().map(|place| margins(place, &all, &at)).collect()
@@ -357,7 +357,7 @@ struct Resolvent {
 }
 
 impl Resolvent {
-    fn of(a: &Matrix) -> Self {
+    fn new(a: &Matrix) -> Self {
         let (a, scales) = balanced(a.clone());
         if a.nrows() < 2 {
             return Self { scales, q: Matrix::identity(a.nrows(), a.nrows()), h: a };

@@ -26,7 +26,7 @@ fn sweep(text: &str, changes: &[&str]) -> Sweep {
 fn simulated(case: &Case, experiment: usize) -> Metrics {
     let mechanism = case.machine.mechanism();
     let mut meter = Meter::new(&case.machine, &case.experiments[experiment]);
-    let (course, solver) = (Course::of(&mechanism, &case.experiments[experiment]), Solver::of_mechanism(&mechanism));
+    let (course, solver) = (Course::new(&mechanism, &case.experiments[experiment]), Solver::of_mechanism(&mechanism));
     let observed = (Detail::Full, Some(&mut meter as _));
     let outcome = stream_mechanism(&mechanism, &course, solver, observed, &mut |_| Flow::Continue).unwrap();
     meter.finish(&outcome.events)
@@ -75,9 +75,9 @@ fn a_row_is_the_run_of_its_machine() {
                 for (number, group) in sweep.groups().iter().enumerate() {
                     assert_eq!(table.get(&format!("{}.status", group.file)).unwrap()[row], Status::Complete.code());
                     let metrics = simulated(&case, number);
-                    for figure in figures(case.machine.kind, Extras::of(&case.machine)) {
+                    for figure in figures(case.machine.kind, Extras::new(&case.machine)) {
                         let value = table.get(&format!("{}.{}", group.file, figure.name)).unwrap()[row];
-                        let told = figure.of(&metrics).number();
+                        let told = figure.value(&metrics).number();
                         assert_eq!(value.to_bits(), told.to_bits(), "{design} {}", figure.name);
                         compared += 1;
                     }

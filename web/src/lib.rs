@@ -68,7 +68,7 @@ fn asked(text: &str) -> Vec<u8> {
         Err(error) => return Reply::error(&error).frame(None),
     };
     let (id, is_stopped) = (Some(request.id), worker::is_stopped);
-    let tell = |step| worker::tell(&Reply::of(json!({ "progress": step })).frame(id));
+    let tell = |step| worker::tell(&Reply::new(json!({ "progress": step })).frame(id));
     taut_acts::answer(&request, &Context::new(&Browser, &is_stopped, &tell)).frame(id)
 }
 

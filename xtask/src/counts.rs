@@ -96,7 +96,7 @@ fn profile(root: &Path, index: usize) -> Result<String, String> {
 
 /// The share of each kind of work in the one with this number.
 fn shares(root: &Path, index: usize) -> Result<Vec<Share>, String> {
-    Ok(shares::of(&profile(root, index)?))
+    Ok(shares::shares(&profile(root, index)?))
 }
 
 /// The sum of the costs in a file of callgrind's: the number behind `summary:`, or behind `totals:`.

@@ -69,7 +69,7 @@ pub(super) struct Folder<'a> {
 
 impl<'a> Folder<'a> {
     /// Reader of the files that the case file `name` refers to.
-    pub fn of(name: &'a Path, wanted: Files<'a>) -> Self {
+    pub fn new(name: &'a Path, wanted: Files<'a>) -> Self {
         let path = name.parent().unwrap_or(Path::new(""));
         Self { path, wanted, named: RefCell::default(), experiment: RefCell::default(), failed: Cell::new(false) }
     }

@@ -118,7 +118,7 @@ pub(super) fn logs(
 /// Keys of the columns that a log of this kind of machine can name, except time: drive inputs, then quantities.
 fn columns_of(kind: machine::MachineKind) -> impl Iterator<Item = &'static str> + Clone {
     let inputs = kind.geometry().drives.iter().map(|drive| drive.input);
-    inputs.chain(Quantity::of(kind).iter().map(|quantity| quantity.name()))
+    inputs.chain(Quantity::for_kind(kind).iter().map(|quantity| quantity.name()))
 }
 
 /// The column of each drive's input, unless the experiment has inputs of its own.

@@ -199,7 +199,7 @@ impl Case {
             MachineKind::Axis => machine::machine(&root)?,
             _ => gantry::machine(&root, kind, name)?,
         };
-        let folder = Folder::of(name, files);
+        let folder = Folder::new(name, files);
         let controller = controller::controller(&root, &machine)?;
         let moves = motion::moves(&root, &machine, controller.as_ref())?;
         // A machine alone can be shown, shaped, exported, and an experiment can be designed for it.

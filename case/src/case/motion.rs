@@ -192,7 +192,7 @@ fn planned(table: &Table, field: &Field, from: &[f64], machine: &Machine, design
     let any = Limits { speed: 1.0, acceleration: 1.0, jerk: None, snap: None };
     let told = |error: Error| Error { place: field.fail("").place, ..error };
     let profiles = profiles(table, machine, from, &any).map_err(told)?;
-    let way = MovePath::of(&profiles).ok_or_else(|| field.fail("a move without a stroke has no plan"))?;
+    let way = MovePath::new(&profiles).ok_or_else(|| field.fail("a move without a stroke has no plan"))?;
     let modes = modes(machine);
     let quickest = Quickest { machine, design, modes: &modes, wanted: &wanted };
     quickest.check(&way).map_err(told)?;

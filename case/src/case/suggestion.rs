@@ -92,7 +92,7 @@ fn gains(machine: &Machine, every: f64, delay: f64) -> Pid {
 /// At a resonance the speed of the drive pulley per force on it is at most 1/d₁ with its own drag d₁, so the derivative
 /// g K_d = 3 ζ ω₀ M − d may be at most `AT_RESONANCE` d₁.
 fn damped(machine: &Machine) -> f64 {
-    let rigid = Rigid::of(machine);
+    let rigid = Rigid::new(machine);
     let idle = rigid.viscous[0] - machine.drive_pulley.friction.side(true).viscous / machine.pulley_radius.powi(2);
     let own = rigid.drag() - idle;
     (AT_RESONANCE * own + rigid.drag()) / (3.0 * DAMPING * rigid.mass) / (2.0 * PI)
@@ -101,7 +101,7 @@ fn damped(machine: &Machine) -> f64 {
 /// The slowest swing of cart and idler pulley with the motor held, Hz; none of a belt that does not stretch.
 fn antiresonance(machine: &Machine) -> Option<f64> {
     let mut held = machine.clone();
-    held.drive_pulley.inertia = HELD * Rigid::of(machine).mass * machine.pulley_radius.powi(2);
+    held.drive_pulley.inertia = HELD * Rigid::new(machine).mass * machine.pulley_radius.powi(2);
     slowest_swing(&held.mechanism()).map(|swing| swing / (2.0 * PI))
 }
 

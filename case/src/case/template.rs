@@ -26,7 +26,7 @@ impl Template {
     /// use taut::overview::Overview;
     /// for template in [Template::Stage, Template::PrinterServo, Template::Gantry] {
     ///     let case = Case::from_text("machine.toml", template.text())?;
-    ///     assert!(Overview::of(&case)?.value("largest_force").unwrap() > 10.0);
+    ///     assert!(Overview::new(&case)?.value("largest_force").unwrap() > 10.0);
     /// }
     /// # Ok::<(), taut::Error>(())
     /// ```

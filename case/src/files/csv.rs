@@ -39,7 +39,7 @@ impl CsvWriter {
             let headings: Vec<String> = block.columns.iter().map(Column::heading).collect();
             self.text.extend(headings.join(",").bytes());
             self.text.push(b'\n');
-            self.last = vec![Digits::of(0.0); block.columns.len()];
+            self.last = vec![Digits::new(0.0); block.columns.len()];
         }
         let Some((first, others)) = block.columns.split_first() else { return Ok(()) };
         for row in 0..block.len() {
@@ -81,7 +81,7 @@ struct Digits {
 }
 
 impl Digits {
-    fn of(value: f64) -> Self {
+    fn new(value: f64) -> Self {
         let mut buffer = zmij::Buffer::new();
         let all = match value {
             v if v.is_finite() => buffer.format_finite(v),
@@ -99,7 +99,7 @@ impl Digits {
     /// Takes those of another number.
     fn become_those_of(&mut self, value: f64) {
         if value.to_bits() != self.bits {
-            *self = Self::of(value);
+            *self = Self::new(value);
         }
     }
 
@@ -118,7 +118,7 @@ mod tests {
 
     fn shown(value: f64) -> String {
         let mut text = Vec::new();
-        Digits::of(value).write_to(&mut text);
+        Digits::new(value).write_to(&mut text);
         String::from_utf8(text).unwrap()
     }
 

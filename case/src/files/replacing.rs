@@ -38,7 +38,7 @@ pub(super) fn like(old: &Path, path: &Path) -> io::Result<File> {
     let mut options = OpenOptions::new();
     options.write(true).create_new(true);
     #[cfg(unix)]
-    if let Some(kept) = Kept::of(old)? {
+    if let Some(kept) = Kept::read(old)? {
         std::os::unix::fs::OpenOptionsExt::mode(&mut options, kept.mode & 0o700 | 0o600);
         let file = options.open(path)?;
         return kept.give(&file).map(|()| file);
@@ -50,7 +50,7 @@ pub(super) fn like(old: &Path, path: &Path) -> io::Result<File> {
 /// Gives the file `path` the permissions and the owner of `old`, if that exists.
 pub(super) fn adopt(old: &Path, path: &Path) -> io::Result<()> {
     #[cfg(unix)]
-    if let Some(kept) = Kept::of(old)? {
+    if let Some(kept) = Kept::read(old)? {
         return kept.give(&File::open(path)?);
     }
     let _ = (old, path, ErrorKind::NotFound);
@@ -68,7 +68,7 @@ struct Kept {
 #[cfg(unix)]
 impl Kept {
     /// Attributes of a file; none if it does not exist.
-    fn of(path: &Path) -> io::Result<Option<Self>> {
+    fn read(path: &Path) -> io::Result<Option<Self>> {
         use std::os::unix::fs::MetadataExt;
         match fs::metadata(path) {
             Ok(data) if data.is_file() => {

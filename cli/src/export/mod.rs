@@ -53,7 +53,7 @@ pub fn run(args: &Args) -> Outcome {
         true => "axis".to_string(),
         false => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),
     };
-    let place = common.out.as_deref().map(|out| Destination::of(out, target.ending(), &own));
+    let place = common.out.as_deref().map(|out| Destination::new(out, target.ending(), &own));
     let stem = place.as_ref().map_or(&own, |place| &place.stem);
     let inputs = folder::inputs(path, &case.files);
     let target_at = place.as_ref().map(|place| claimed(place, target, &inputs)).transpose()?;

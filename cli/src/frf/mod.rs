@@ -18,7 +18,7 @@ pub fn run(args: &Args) -> Outcome {
     let case = common.open(&args.case)?;
     let folder =
         Folder::wanted(common, || folder::inputs(&args.case, &case.files), ["frf.json", "frf.csv", "report.html"])?;
-    let known = Known::of(&case, args.at, args.bridge, args.delay)?;
+    let known = Known::new(&case, args.at, args.bridge, args.delay)?;
     let cut = Cut { segment: args.segment, period: args.period };
     let found = measure(&case, &cut, known).map_err(|error| error.in_file(&args.case))?;
     let data = json::text(&json::frf(&case, &found));

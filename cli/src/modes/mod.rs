@@ -17,7 +17,7 @@ use taut_report::modes::{page, pictures};
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
     let case = common.open_for(&args.case, Files::Nothing)?;
-    let analysis = Analysis::of(&case, &question(args))?;
+    let analysis = Analysis::new(&case, &question(args))?;
     let map = analysis.map.is_some().then_some("map.csv");
     let names = ["modes.json", "frequency-response.csv", "report.html"].into_iter().chain(map);
     let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), names)?;

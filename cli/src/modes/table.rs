@@ -36,7 +36,7 @@ pub fn text(analysis: &Analysis, is_verbose: bool) -> String {
         shapes(&mut text, analysis, modes);
     }
     let _ = write!(text, "\n{}\n", bold("Poles"));
-    for root in Root::of(&analysis.poles) {
+    for root in Root::from_values(&analysis.poles) {
         let (value, more) = pole(root);
         let _ = writeln!(text, "  {value:<36}{more}");
     }

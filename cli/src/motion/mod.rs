@@ -113,7 +113,7 @@ fn names(args: &Args, case: &Case, path: &Path) -> Result<Vec<String>> {
 fn told(tried: &Tried) -> impl serde::Serialize + use<> {
     let moved: Vec<Moved> = tried.done.iter().map(|done| done.told(&tried.case.machine)).collect();
     let (design, case) = (tried.design, tried.case);
-    json::moves(&case.title, design.structure.name(), &Loop::of(design), &case.machine, &moved)
+    json::moves(&case.title, design.structure.name(), &Loop::new(design), &case.machine, &moved)
 }
 
 /// Runs one move.
@@ -134,7 +134,7 @@ fn one<'a>(
     let mut writer = writer.map_err(Failure::work)?;
     let mut curves = folder.is_some().then(|| Curves::new(machine)).filter(|_| !args.common.no_report);
     let mut trouble = None;
-    let (timing, solver) = (Loop::of(design), Solver::of(machine));
+    let (timing, solver) = (Loop::new(design), Solver::for_machine(machine));
     let mut accuracy = Accuracy::new(machine, &timing, &profiles, &rows, solver);
     let mut take = |block: &Trajectory| {
         accuracy.take(block);

@@ -16,7 +16,7 @@ pub fn drive_pulley(machine: &Machine) -> String {
 pub fn whole(machine: &Machine) -> String {
     let mechanism = machine.mechanism();
     let [drive, cart, idler] = [DRIVE, CART, IDLER].map(|b| body(machine, &mechanism, b));
-    let load = mechanism.load(DRIVE, true, &Mode::of([]));
+    let load = mechanism.load(DRIVE, true, &Mode::new([]));
     let motor = MotorEquation {
         input: "V_in".into(),
         torque: "τ_M".into(),
@@ -36,7 +36,7 @@ const SPEEDS: [&str; 3] = ["x₂ = φ̇₁", "x₄ = ẋ", "x₆ = φ̇₃"];
 
 /// Eq. (16), (17) or (18), with symbols beside the coefficients of the form that the solver uses.
 fn body(machine: &Machine, mechanism: &Mechanism, body: usize) -> BodyEquation {
-    let form: Form = mechanism.load(body, true, &Mode::of([]));
+    let form: Form = mechanism.load(body, true, &Mode::new([]));
     let State { position, speed, .. } = form.on_state(mechanism);
     // What the coefficients of φ₁, x, φ₃ and φ̇₁ are called.
     let (gains, unit, torque) = match body {

@@ -30,7 +30,7 @@ impl What {
         }
     }
 
-    fn of(self, response: &Response) -> &[f64] {
+    fn values(self, response: &Response) -> &[f64] {
         match self {
             What::Position => &response.position,
             What::Speed => &response.speed,
@@ -94,7 +94,7 @@ fn alone<'a>(responses: &'a [Response; 2], what: What, name: &str) -> Vec<Curve<
 
 fn one_curve<'a>(responses: &'a [Response; 2], i: usize, what: What, name: &str, colour: Colour) -> Curve<'a> {
     let volts = VOLTS[i];
-    Curve::new(format!("{name}, {volts}\u{a0}V"), what.heading("nominal", volts), what.of(&responses[i]), colour)
+    Curve::new(format!("{name}, {volts}\u{a0}V"), what.heading("nominal", volts), what.values(&responses[i]), colour)
 }
 
 fn open_loop(f: &Findings, number: u8, what: What) -> Plot {
@@ -133,7 +133,7 @@ fn varied<'a>(effects: &[&'a Effect], what: What, name: &str) -> Vec<Curve<'a>> 
             let curve = Curve::new(
                 format!("{name} {word}, {}\u{a0}V", e.volts),
                 what.heading(&format!("{}_x{}", key(e.change), e.factor), e.volts),
-                what.of(&e.response),
+                what.values(&e.response),
                 colour,
             );
             if e.volts < 7.0 { curve.style(Style::Dashed) } else { curve }
@@ -155,7 +155,7 @@ fn stiffness(f: &Findings, number: u8, what: What, factor: f64) -> Plot {
     let runs = &f.runs.table1;
     let difference = |e: &Effect| -> Vec<f64> {
         let i = usize::from(e.volts > 7.0);
-        what.of(&e.response).iter().zip(what.of(&runs[i])).map(|(a, b)| a - b).collect()
+        what.values(&e.response).iter().zip(what.values(&runs[i])).map(|(a, b)| a - b).collect()
     };
     let differences = effects.map(difference);
     let change = match what {
@@ -213,7 +213,7 @@ fn inertia(f: &Findings, number: u8, what: What) -> Plot {
             "Above the pulleys' inertia J alone, below J and the cart's mass M. All end at the same place: \
              the largest change is {}.",
             percent(super::studies::largest(
-                f.runs.of(From::Table1, &[Change::PulleyInertia, Change::AllInertia]),
+                f.runs.effects(From::Table1, &[Change::PulleyInertia, Change::AllInertia]),
                 |e| e.final_position
             ))
         ),
@@ -235,7 +235,7 @@ fn inertia(f: &Findings, number: u8, what: What) -> Plot {
 
 fn friction(f: &Findings, number: u8, what: What) -> Plot {
     let runs = &f.runs.table1;
-    let effects: Vec<&Effect> = f.runs.of(From::Table1, &[Change::Friction]).collect();
+    let effects: Vec<&Effect> = f.runs.effects(From::Table1, &[Change::Friction]).collect();
     let mut curves = base(runs, what, "Table 1");
     curves.extend(varied(&effects, what, "B, b"));
     let one = |factor| f.runs.one(From::Table1, Change::Friction, factor, VOLTS[0]);
@@ -266,7 +266,7 @@ fn matched(f: &Findings, number: u8, what: What) -> Plot {
         let name = format!("Table 4, simulated, {volts}\u{a0}V");
         let heading = what.heading("table4", volts);
         let style = if i == 1 { Style::Solid } else { Style::Dashed };
-        curves.push(Curve::new(name, heading, what.of(&f.runs.table4[i]), Colour::Vermillion).style(style));
+        curves.push(Curve::new(name, heading, what.values(&f.runs.table4[i]), Colour::Vermillion).style(style));
     }
     let m = &f.matched;
     let (at_5, at_10, of) = match what {

@@ -11,7 +11,7 @@ pub type Matrix = SMatrix<f64, 6, 6>;
 /// A and b of the equations that run, without dry friction: φ₁, φ₁′, x, x′, φ₃, φ₃′.
 pub fn matrices(machine: &Machine) -> (Matrix, SVector<f64, 6>) {
     let mechanism = machine.mechanism();
-    let equations = mechanism.equations(Mode::of([]));
+    let equations = mechanism.equations(Mode::new([]));
     let mut a = Matrix::zeros();
     let mut b = SVector::<f64, 6>::zeros();
     for body in 0..3 {

@@ -33,7 +33,7 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
         .flat_map(|s| [0, 1].map(|k| s.difference[k] / f.runs.table4[k].final_position()))
         .fold(0.0, f64::max);
     let inertia: [Change; 2] = [Change::PulleyInertia, Change::AllInertia];
-    let final_position = |from| largest(f.runs.of(from, &inertia), |e| e.final_position);
+    let final_position = |from| largest(f.runs.effects(from, &inertia), |e| e.final_position);
     let cart = f.runs.table1[0].final_cart_position();
     vec![
         print("p1-sign-of-b", "eq. (7)", "A(4,4) = +b/M")
@@ -285,24 +285,24 @@ pub fn readings(f: &Findings) -> Vec<Claim> {
         )
         .decide(
             "largest change, Table 1",
-            largest(f.runs.of(From::Table1, &[Change::Stiffness]), |e| e.final_position),
+            largest(f.runs.effects(From::Table1, &[Change::Stiffness]), |e| e.final_position),
             "1",
             Rule::AtMost(1e-5),
         )
         .decide(
             "largest change, Table 4",
-            largest(f.runs.of(From::Table4, &[Change::Stiffness]), |e| e.final_position),
+            largest(f.runs.effects(From::Table4, &[Change::Stiffness]), |e| e.final_position),
             "1",
             near(3e-4, 0.5e-4),
         )
         .found(format!(
             "Table 1: {}; Table 4: up to {}",
-            share(largest(f.runs.of(From::Table1, &[Change::Stiffness]), |e| e.final_position)),
-            share(largest(f.runs.of(From::Table4, &[Change::Stiffness]), |e| e.final_position))
+            share(largest(f.runs.effects(From::Table1, &[Change::Stiffness]), |e| e.final_position)),
+            share(largest(f.runs.effects(From::Table4, &[Change::Stiffness]), |e| e.final_position))
         ))
         .remark(format!(
             "Table 1: {}.",
-            share(largest(f.runs.of(From::Table1, &[Change::Stiffness]), |e| e.final_position))
+            share(largest(f.runs.effects(From::Table1, &[Change::Stiffness]), |e| e.final_position))
         )),
     ]
 }

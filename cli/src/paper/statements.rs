@@ -26,8 +26,8 @@ pub fn statements(f: &Findings) -> Vec<Claim> {
 
 fn figures_4_to_13(f: &Findings) -> Vec<Claim> {
     let runs = &f.runs;
-    let linear = |changes: &'static [Change]| runs.of(From::Table1, changes);
-    let dry = |changes: &'static [Change]| runs.of(From::Table4, changes);
+    let linear = |changes: &'static [Change]| runs.effects(From::Table1, changes);
+    let dry = |changes: &'static [Change]| runs.effects(From::Table4, changes);
     let friction: &[Change] = &[Change::Friction];
     let stiffness: &[Change] = &[Change::Stiffness];
     let final_position = |e: &Effect| e.final_position;
@@ -35,7 +35,7 @@ fn figures_4_to_13(f: &Findings) -> Vec<Claim> {
     let plateau = |e: &Effect| e.plateau;
     let oscillation = |e: &Effect| e.oscillation;
     let ratio = |from: From, by: fn(&Effect) -> f64| {
-        smallest(runs.of(from, friction), by) / largest(runs.of(from, &ALL_BUT_FRICTION), by)
+        smallest(runs.effects(from, friction), by) / largest(runs.effects(from, &ALL_BUT_FRICTION), by)
     };
     let one = |from, change, factor| runs.one(from, change, factor, VOLTS[0]);
     let [double, half] = FACTORS;

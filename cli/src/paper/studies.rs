@@ -91,13 +91,15 @@ impl Runs {
     }
 
     /// The effects of changes of one kind on one set.
-    pub fn of(&self, from: From, changes: &[Change]) -> impl Iterator<Item = &Effect> {
+    pub fn effects(&self, from: From, changes: &[Change]) -> impl Iterator<Item = &Effect> {
         self.effects.iter().filter(move |e| e.from == from && changes.contains(&e.change))
     }
 
     /// One effect.
     pub fn one(&self, from: From, change: Change, factor: f64, volts: f64) -> &Effect {
-        self.of(from, &[change]).find(|e| e.factor == factor && e.volts == volts).expect("every combination is run")
+        self.effects(from, &[change])
+            .find(|e| e.factor == factor && e.volts == volts)
+            .expect("every combination is run")
     }
 }
 

@@ -15,7 +15,7 @@ use taut_report::show::{figures, page};
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
     let case = common.open_for(&args.case, Files::All)?;
-    let overview = Overview::of(&case)?;
+    let overview = Overview::new(&case)?;
     let folder = Folder::wanted(common, || folder::inputs(&args.case, &case.files), ["show.json", "report.html"])?;
     let advice = "add --out DIR for the same as data and a report";
     let json = ("show.json", json::text(&json::show(&overview)));

@@ -41,7 +41,7 @@ pub fn chosen(mut machines: Vec<Machine>, count: usize) -> Vec<Machine> {
 }
 
 /// Runs the experiment with each machine, on all processors; none where it was interrupted.
-pub fn of(setting: &RunSettings, machines: &[Machine], experiment: &Experiment) -> Result<Option<Band>> {
+pub fn band(setting: &RunSettings, machines: &[Machine], experiment: &Experiment) -> Result<Option<Band>> {
     let every = experiment.samples().div_ceil(ROWS).max(1) as usize;
     let runs: Vec<Option<[Vec<f64>; 4]>> =
         machines.par_iter().map(|machine| run(setting, machine, experiment, every)).collect::<Result<_>>()?;

@@ -68,7 +68,7 @@ impl<'a> RunSettings<'a> {
         }
         let mut band = None;
         if !self.machines.is_empty() && self.interrupt.signal().is_none() {
-            band = band::of(self, self.machines, experiment)?;
+            band = band::band(self, self.machines, experiment)?;
             if let Some(band) = &band {
                 files.extend(band::write(band, self, experiment).map_err(Failure::work)?);
             }
@@ -77,7 +77,7 @@ impl<'a> RunSettings<'a> {
         let took = begin.elapsed();
         let (mut reduction, mut log) = (None, None);
         if self.interrupt.signal().is_none() {
-            reduction = Reduction::of(machine, experiment, self.solver)?;
+            reduction = Reduction::new(machine, experiment, self.solver)?;
             log = beside_log(machine, experiment);
         }
         Ok(SimulatedExperiment { experiment, outcome, metrics, curves, samples, band, log, reduction, files, took })

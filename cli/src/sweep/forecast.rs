@@ -24,7 +24,7 @@ const CSV: f64 = 19.0;
 pub fn told(work: &Work, target: &Target, threads: usize) -> Result<(), Failure> {
     let Some(rows) = options::rows(target) else { return Ok(()) };
     let parquet = rows.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("parquet"));
-    let room = DiskSpace::of(work.sweep.runs(), work.sweep.columns().len(), if parquet { PARQUET } else { CSV });
+    let room = DiskSpace::new(work.sweep.runs(), work.sweep.columns().len(), if parquet { PARQUET } else { CSV });
     let folder = rows.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
     room.check(folder, free(folder).map(|free| free + size(&beside(&rows, PARTS))))?;
     let begin = Instant::now();
@@ -49,7 +49,7 @@ struct DiskSpace {
 
 impl DiskSpace {
     /// Of so many runs, with rows of so many numbers of `each` bytes.
-    fn of(runs: u64, columns: usize, each: f64) -> Self {
+    fn new(runs: u64, columns: usize, each: f64) -> Self {
         let numbers = runs as f64 * columns as f64;
         Self { runs, file: numbers * each, all: numbers * (each + PART) }
     }
@@ -116,7 +116,7 @@ mod tests {
     /// `--runs 1e12` began to write, and would have filled the disk after hours.
     #[test]
     fn what_does_not_fit_is_refused_before_it_begins() {
-        let room = DiskSpace::of(1_000_000_000, 30, PARQUET);
+        let room = DiskSpace::new(1_000_000_000, 30, PARQUET);
         let failure = room.check(Path::new("out"), Some(100e9)).unwrap_err();
         assert_eq!(failure.status, 1);
         assert_eq!(
@@ -126,6 +126,6 @@ mod tests {
              next: sweep fewer runs, or name an --out on a larger disk"
         );
         assert!(room.check(Path::new("out"), Some(500e9)).is_ok() && room.check(Path::new("out"), None).is_ok());
-        assert_eq!(DiskSpace::of(MOST_RUNS + 1, 1, CSV).check(Path::new("out"), None).unwrap_err().status, 2);
+        assert_eq!(DiskSpace::new(MOST_RUNS + 1, 1, CSV).check(Path::new("out"), None).unwrap_err().status, 2);
     }
 }

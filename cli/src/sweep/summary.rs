@@ -47,8 +47,8 @@ pub fn summary(work: &Work, store: &Store) -> Result<Summary> {
             let values = column(place)?;
             let heading = &sweep.columns()[place];
             let few = thinned(&values, MOST_RANKED);
-            let ranked = Ranked::of(&few);
-            Ok((heading, Spread::of(&values), few, ranked))
+            let ranked = Ranked::new(&few);
+            Ok((heading, Spread::new(&values), few, ranked))
         })
         .collect::<Result<Vec<_>>>()?;
     let is_drawn = sweep.sampling() != Sampling::OneAtATime;
@@ -66,7 +66,7 @@ pub fn summary(work: &Work, store: &Store) -> Result<Summary> {
             let few = thinned(&values, MOST_RANKED);
             let ranks = match is_drawn {
                 true => {
-                    let ranked = Ranked::of(&few);
+                    let ranked = Ranked::new(&few);
                     drawn.iter().map(|(.., of_drawn)| of_drawn.correlation(&ranked)).collect()
                 }
                 false => Vec::new(),
@@ -79,7 +79,7 @@ pub fn summary(work: &Work, store: &Store) -> Result<Summary> {
                 name: figure.name.clone(),
                 unit: figure.unit,
                 words: figure.words.clone(),
-                spread: Spread::of(&values),
+                spread: Spread::new(&values),
                 ranks,
                 indices,
                 nominal: if is_drawn { f64::NAN } else { values.first().copied().unwrap_or(f64::NAN) },

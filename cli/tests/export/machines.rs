@@ -169,10 +169,10 @@ pub fn observed_drives(case: &Case, which: usize) -> Vec<Vec<(LoopRecord, f64)>>
     let own = Standard::of_drives(design, &case.machine).unwrap();
     let watched = |own| Watched { own, ahead: Vec::new(), slides: profiles.len(), seen: Vec::new() };
     let mut watched: Vec<Watched> = own.into_iter().map(watched).collect();
-    let timing = Loop::of(design);
+    let timing = Loop::new(design);
     let mut each: Vec<&mut dyn Controller> = watched.iter_mut().map(|one| one as &mut dyn Controller).collect();
     let rows = Rows { until: one.until, every: design.every, window: one.window };
-    let (solver, sink) = (Solver::of(&case.machine), &mut |_: &_| Flow::Continue);
+    let (solver, sink) = (Solver::for_machine(&case.machine), &mut |_: &_| Flow::Continue);
     let run = stream(&case.machine, &mut each, &timing, &profiles, &rows, solver, true, sink).unwrap();
     let of_drive = |(drive, watched): (usize, Watched)| {
         let samples = run.kept.iter().filter(|sample| sample.drive == drive);

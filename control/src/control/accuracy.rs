@@ -26,7 +26,7 @@ use crate::trajectory::Trajectory;
 /// # let text = std::fs::read_to_string(path).unwrap();
 /// let case = Case::from_text("pid.toml", &text)?;
 /// let (machine, design, motion) = (&case.machine, case.controller.as_ref().unwrap(), &case.moves[0]);
-/// let (profiles, timing, solver) = (motion.references(design), Loop::of(design), Solver::Exact);
+/// let (profiles, timing, solver) = (motion.references(design), Loop::new(design), Solver::Exact);
 /// let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
 /// let mut own = Standard::of_drives(design, machine)?;
 /// let controllers = &mut each(&mut own);
@@ -54,7 +54,7 @@ impl<'a> Accuracy<'a> {
     pub fn new(machine: &'a Machine, timing: &Loop, profiles: &'a [Profile], rows: &Rows, solver: Solver) -> Self {
         let mechanism = machine.mechanism();
         let experiment = at_rest(machine, profiles, rows.until, rows.every);
-        let estimate = ErrorEstimate::of_mechanism(&mechanism, &Course::of(&mechanism, &experiment));
+        let estimate = ErrorEstimate::of_mechanism(&mechanism, &Course::new(&mechanism, &experiment));
         Self { machine, mechanism, profiles, timing: *timing, solver, experiment, estimate }
     }
 
@@ -72,7 +72,7 @@ impl<'a> Accuracy<'a> {
     ) -> Result<Option<PositionError>> {
         let Self { machine, mechanism, profiles, timing, solver, experiment, estimate } = self;
         let solvers = [solver, ErrorEstimate::second(solver, is_sampled(machine))];
-        let course = Course::of(&mechanism, &experiment);
+        let course = Course::new(&mechanism, &experiment);
         controllers.iter_mut().for_each(|controller| controller.reset());
         let mut sampled = Sampled::new(machine, controllers, timing, profiles, false).until(experiment.until);
         let error = estimate.finish_driven(&mechanism, &course, solvers, (&run.outcome, flow), &mut |second| {
@@ -84,7 +84,7 @@ impl<'a> Accuracy<'a> {
 
     /// Basis of the estimate for a move of this machine, in words.
     pub fn basis(machine: &Machine) -> &'static str {
-        ErrorEstimate::basis(Solver::of(machine), is_sampled(machine))
+        ErrorEstimate::basis(Solver::for_machine(machine), is_sampled(machine))
     }
 }
 

@@ -41,7 +41,7 @@ pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
     if machine.drives.len() > 1 {
         return Vec::new();
     }
-    let rigid = Rigid::of(machine);
+    let rigid = Rigid::new(machine);
     let motor = &machine.drives[0].motor;
     // Voltage or current at the motor, without the amplifier's gain, which belongs to the drive.
     let gain = machine.drives[0].amplifier.gain;

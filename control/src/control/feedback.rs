@@ -81,7 +81,7 @@ pub struct Turn {
 
 impl Turn {
     /// Terms of the frequency ω, rad/s, at a sample time T, s.
-    pub fn of(omega: f64, t: f64) -> Self {
+    pub fn new(omega: f64, t: f64) -> Self {
         let half = Complex::new(0.0, 0.5 * omega * t).exp();
         let change = Complex::new(0.0, 2.0 * half.im) * half;
         Self { z: Complex::new(0.0, omega * t).exp(), change }
@@ -98,7 +98,7 @@ impl Feedback {
     /// Linear feedback of a design for a model of the axis.
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         let text = Text::new(design, model)?;
-        let mut system = System::of(&text, model.scale.is_some());
+        let mut system = System::new(&text, model.scale.is_some());
         system.reduce();
         let parts = system.order();
         Ok(Self {
@@ -119,7 +119,7 @@ impl Feedback {
 
     /// At z = e^{jωT}; ω in rad/s, above zero.
     pub fn at(&self, omega: f64) -> Terms {
-        self.at_turn(&Turn::of(omega, self.every))
+        self.at_turn(&Turn::new(omega, self.every))
     }
 
     /// Terms of the feedback for the precomputed terms of a frequency.
@@ -255,7 +255,7 @@ struct System {
 
 impl System {
     /// Linearises at rest, after the first sample.
-    fn of(text: &Text, has_scale: bool) -> Self {
+    fn new(text: &Text, has_scale: bool) -> Self {
         let n = text.slots.count();
         let rest = text.at_rest(has_scale);
         let mut memory = vec![0.0; n];

@@ -91,9 +91,9 @@ impl Voltage {
     fn on(&self, curve: &Curve, current: &Polynomial) -> Polynomial {
         match *self {
             Self::OfPhases => Polynomial([0.0; TERMS]),
-            Self::Read(q) => curve.of(q),
+            Self::Read(q) => curve.polynomial(q),
             Self::Computed { speed, resistance, inductance, back_emf } => {
-                let (rate, speed) = (slope(current, curve.length), curve.of(speed));
+                let (rate, speed) = (slope(current, curve.length), curve.polynomial(speed));
                 let sum = |k: usize| resistance * current.0[k] + inductance * rate.0[k] + back_emf * speed.0[k];
                 Polynomial(std::array::from_fn(sum))
             }
@@ -127,7 +127,7 @@ impl LoadGauge {
 
     /// Updates overshoot and settling after the last stroke and the profile, which ends at `end`.
     fn settle(&mut self, curve: &Curve, end: f64, window: f64) {
-        let mut away = curve.of(self.position);
+        let mut away = curve.polynomial(self.position);
         away.0[0] -= self.target;
         let share = |time: f64| ((time - curve.begin) / curve.length).max(0.0);
         let (last, done) = (share(self.approach.0), share(end));
@@ -158,7 +158,7 @@ impl LoadGauge {
 }
 
 impl SpanGauge {
-    fn of(machine: &Machine, mechanism: &Mechanism) -> Vec<Self> {
+    fn from_machine(machine: &Machine, mechanism: &Mechanism) -> Vec<Self> {
         let find = |span: usize| {
             let wanted = Shown::Force(machine.span_alike(span)?, 1.0);
             mechanism.readings.iter().position(|reading| *reading == wanted)
@@ -178,7 +178,7 @@ impl SpanGauge {
     }
 
     fn see(&mut self, curve: &Curve) {
-        let force = curve.of(self.force);
+        let force = curve.polynomial(self.force);
         let (low, high) = force.range();
         if low < self.seen[0].value {
             let (s, value) = force.negative().greatest(0.0, 1.0);
@@ -218,7 +218,7 @@ impl DriveGauge {
 
     /// Adds voltage and current over a curve.
     fn power(&mut self, curve: &Curve, is_brief: bool) {
-        let i = curve.of(self.current);
+        let i = curve.polynomial(self.current);
         if is_brief {
             self.squares[2] += curve.length * integral((0.0, 1.0), |s| i.at(s).powi(2));
             return;
@@ -262,7 +262,7 @@ impl<'a> Gauge<'a> {
             window,
             loads: loads.map(|load| LoadGauge::new(load, &mechanism)).collect(),
             drives: (0..machine.drives.len()).map(|drive| DriveGauge::new(machine, &mechanism, drive)).collect(),
-            spans: SpanGauge::of(machine, &mechanism),
+            spans: SpanGauge::from_machine(machine, &mechanism),
             contour: Contour::along(profiles).map(ContourGauge::new),
             end: 0.0,
             is_brief: false,
@@ -281,7 +281,7 @@ impl<'a> Gauge<'a> {
         for ((load, reference), (error, place)) in
             self.loads.iter_mut().zip(references).zip(errors.iter_mut().zip(&mut places))
         {
-            let x = curve.of(load.position);
+            let x = curve.polynomial(load.position);
             *place = x;
             // x − y
             *error = Polynomial(std::array::from_fn(|k| x.0[k] - reference.0[k]));
@@ -300,7 +300,7 @@ impl<'a> Gauge<'a> {
             for ((load, error), share) in self.loads.iter().zip(&errors).zip(drive.shares) {
                 following.0.iter_mut().zip(error.0).for_each(|(sum, term)| *sum += share * term);
                 for &(stretch, weight) in &load.stretches {
-                    let stretch = curve.of(stretch);
+                    let stretch = curve.polynomial(stretch);
                     following.0.iter_mut().zip(stretch.0).for_each(|(sum, term)| *sum += share * weight * term);
                 }
             }

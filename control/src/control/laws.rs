@@ -46,7 +46,9 @@ impl AnyLaw {
             Structure::StateFeedback(weights) => {
                 Self::StateFeedback(Box::new(StateFeedbackLaw::new(slots, weights, model, design)?))
             }
-            Structure::SlidingMode(gains) => Self::SlidingMode(SlidingLaw::new(slots, gains, &Rigid::of(model), every)),
+            Structure::SlidingMode(gains) => {
+                Self::SlidingMode(SlidingLaw::new(slots, gains, &Rigid::new(model), every))
+            }
             Structure::Fuzzy(rules) => Self::Fuzzy(FuzzyLaw::new(slots, rules, every)),
             Structure::OpenLoop(open) => Self::OpenLoop(*open),
         })

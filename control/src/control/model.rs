@@ -40,7 +40,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    fn of(self, row: &State) -> f64 {
+    fn value(self, row: &State) -> f64 {
         match self {
             Quantity::Position(body) => row.position[body],
             Quantity::Speed(body) => row.speed[body],
@@ -51,10 +51,10 @@ impl Quantity {
 
 impl Linear {
     /// Model of a machine.
-    pub fn of(machine: &Machine) -> Self {
+    pub fn new(machine: &Machine) -> Self {
         let mechanism = machine.mechanism();
         let r = machine.pulley_radius;
-        let mut mode = Mode::of([]);
+        let mut mode = Mode::new([]);
         if mechanism.drives[0].has_rotor() {
             // Flanks of a gear with play touch.
             mode.contact[SPANS] = Contact::High;
@@ -76,7 +76,7 @@ impl Linear {
                 led.position[leader] += ratio * whole.position[body];
                 led.speed[leader] += ratio * whole.speed[body];
             }
-            RowDVector::from_fn(n, |_, j| states[j].of(&led))
+            RowDVector::from_fn(n, |_, j| states[j].value(&led))
         };
         let of_form = |form: &Form| row(&form.on_state(&mechanism));
         let (mut a, mut b, mut e) = (DMatrix::zeros(n, n), DVector::zeros(n), DVector::zeros(n));

@@ -61,7 +61,7 @@ pub fn closed_loop(setup: &Setup) -> Result<MoveRun> {
     let &Setup { machine, model, design, profiles, until, window, solver } = setup;
     let shaped = design.shaped(profiles);
     let mut controllers = Standard::of_drives(design, model)?;
-    close(machine, &mut each(&mut controllers), &Loop::of(design), &shaped, until, window, solver)
+    close(machine, &mut each(&mut controllers), &Loop::new(design), &shaped, until, window, solver)
 }
 
 /// Controllers of a design as [`close`] and [`stream`] take them.
@@ -199,7 +199,7 @@ pub fn stream(
     keep: bool,
     sink: &mut dyn FnMut(&Trajectory) -> Flow,
 ) -> Result<MoveRun> {
-    let mut wide = Wide::of(machine, profiles);
+    let mut wide = Wide::new(machine, profiles);
     let sink = &mut |block: &Trajectory| sink(wide.widened(profiles, block));
     run(machine, controllers, timing, profiles, rows, solver, (Detail::Full, keep), sink)
 }
@@ -255,7 +255,7 @@ pub fn follow(
 ) -> Result<solve::Outcome> {
     let mut controller = Standard::new(design, model)?;
     let (mut controllers, profiles) = ([&mut controller as &mut dyn Controller], std::slice::from_ref(profile));
-    let sampled = Sampled::new(machine, &mut controllers, Loop::of(design), profiles, false);
+    let sampled = Sampled::new(machine, &mut controllers, Loop::new(design), profiles, false);
     let mut sampled = sampled.exactly().with(added);
     let machine = Machine { encoder: None, ..machine.clone() };
     let mut run = solve::Run::new(&machine, experiment, solver, Detail::Full, None, sink)?;
@@ -277,8 +277,8 @@ mod tests {
         for name in ["sollmann-jouaneh/controllers/pid-elastic.toml", "h-frame/square.toml", "core-xy/square.toml"] {
             let case = Case::read(folder.join(name)).unwrap();
             let (machine, design) = (&case.machine, case.controller.as_ref().unwrap());
-            let (motion, timing) = (&case.moves[0], Loop::of(design));
-            let (profiles, until, solver) = (motion.references(design), motion.until, Solver::of(machine));
+            let (motion, timing) = (&case.moves[0], Loop::new(design));
+            let (profiles, until, solver) = (motion.references(design), motion.until, Solver::for_machine(machine));
             let rows = Rows { until, every: design.every, window: motion.window };
             let mut own = Standard::of_drives(design, machine).unwrap();
             let (mut whole, mut alone) = (Trajectory::default(), Trajectory::default());

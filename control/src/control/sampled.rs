@@ -137,7 +137,7 @@ pub(super) struct Sensors {
 
 impl Sensors {
     /// The sensor of each drive.
-    pub(super) fn of(machine: &Machine) -> Vec<Self> {
+    pub(super) fn from_machine(machine: &Machine) -> Vec<Self> {
         let of_drive = |drive| Self { encoder: Sensor::new(machine, drive), scale: Sensor::of_scale(machine) };
         (0..machine.drives.len()).map(of_drive).collect()
     }
@@ -259,7 +259,7 @@ impl Loop {
     }
 
     /// Sample time, delay, limit and lead of a design.
-    pub fn of(design: &crate::design::Design) -> Self {
+    pub fn new(design: &crate::design::Design) -> Self {
         let lead = design.feed_forward.lead.unwrap_or(design.delay + 0.5 * design.every);
         Self { every: design.every, delay: design.delay, limit: design.limit, lead }
     }

@@ -67,7 +67,7 @@ impl Spectrum {
                     false => "a spectrum",
                 };
                 let parts = [x, y, z, all].map(|density| scaled(frequency, density, *per_frequency, firmware));
-                Self::of(frequency, parts, axis, origin.to_string())
+                Self::from_frequency(frequency, parts, axis, origin.to_string())
             }
             Accelerometer::Samples { time, acceleration } => {
                 let span = time[time.len() - 1] - time[0];
@@ -80,12 +80,12 @@ impl Spectrum {
                 let all: Vec<f64> = x.1.iter().zip(&y.1).zip(&z.1).map(|((x, y), z)| x + y + z).collect();
                 let parts = [x.1, y.1, z.1, all].map(|density| scaled(&frequency, &density, false, firmware));
                 let origin = format!("{} samples in {span:.1} s, {rate:.0} a second, segments of {length}", time.len());
-                Self::of(&frequency, parts, axis, origin)
+                Self::from_frequency(&frequency, parts, axis, origin)
             }
         }
     }
 
-    fn of(frequency: &[f64], [x, y, z, all]: [Vec<f64>; 4], axis: Axis, origin: String) -> Self {
+    fn from_frequency(frequency: &[f64], [x, y, z, all]: [Vec<f64>; 4], axis: Axis, origin: String) -> Self {
         let count = frequency.iter().take_while(|f| **f <= HIGHEST).count();
         let cut = |part: &[f64]| part[..count].to_vec();
         let density = match axis {

@@ -53,7 +53,7 @@ pub fn worst(
     }
     let mut worst = Worst::default();
     let profiles = motion.references(design);
-    let timing = Loop::of(design);
+    let timing = Loop::new(design);
     let rows = Rows { until: motion.until, every: timing.every.min(motion.until), window: motion.window };
     for (axis, other) in spread(machine, share) {
         let mut controllers = Standard::of_drives(design, machine)?;

@@ -45,7 +45,7 @@ pub struct Text {
 impl Text {
     /// Controller of a drive of `model` by `design`, with its share of a joint feed-forward if there are several drives.
     pub fn of_drive(design: &Design, model: &Machine, drive: usize) -> Result<Self> {
-        Ok(Self { forward: Forward::of(design.feed_forward, model, drive), ..Self::new(design, model)? })
+        Ok(Self { forward: Forward::new(design.feed_forward, model, drive), ..Self::new(design, model)? })
     }
 
     /// Controller of `design` for a `model` of the axis.
@@ -173,16 +173,16 @@ impl Standard {
     /// The controller of `design` for a `model` of the axis.
     pub fn new(design: &Design, model: &Machine) -> Result<Self> {
         let text = Text::new(design, model)?;
-        Ok(Self::of(text))
+        Ok(Self::from_text(text))
     }
 
-    fn of(text: Text) -> Self {
+    fn from_text(text: Text) -> Self {
         Self { memory: vec![0.0; text.slots.count()], text, inner: None }
     }
 
     /// A controller for each drive of a machine.
     pub fn of_drives(design: &Design, model: &Machine) -> Result<Vec<Self>> {
-        (0..model.drives.len()).map(|drive| Text::of_drive(design, model, drive).map(Self::of)).collect()
+        (0..model.drives.len()).map(|drive| Text::of_drive(design, model, drive).map(Self::from_text)).collect()
     }
 
     /// Memory from sample to sample.

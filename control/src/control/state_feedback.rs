@@ -66,7 +66,7 @@ fn dot<C: Calculator>(c: &mut C, weights: &[(usize, f64)], of: &[C::N]) -> C::N 
 impl StateFeedbackLaw {
     /// For a model of the axis.
     pub fn new(slots: &mut Slots, weights: &StateFeedback, machine: &Machine, design: &Design) -> Result<Self> {
-        let linear = Linear::of(machine);
+        let linear = Linear::new(machine);
         let n = linear.a.nrows();
         let every = design.every;
         let ratio = design.delay / every;
@@ -126,7 +126,7 @@ impl StateFeedbackLaw {
         let regulator = riccati::discrete(&a, &b, &q, &r)?;
 
         // The filter is the transposed problem; the disturbance acts at the command, and as the same force at the cart.
-        let force = Rigid::of(machine).force_per_command();
+        let force = Rigid::new(machine).force_per_command();
         let mut noise = DMatrix::zeros(n, n);
         for (column, scale) in [(0, weights.disturbance), (1, weights.disturbance * force)] {
             let effect = both.column(column) * scale;

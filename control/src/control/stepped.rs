@@ -52,8 +52,8 @@ impl Clocked {
         let (whole, rest) = timing.samples_late();
         Self {
             timing,
-            clock: Interval::of(timing.every),
-            sensors: Sensors::of(machine),
+            clock: Interval::new(timing.every),
+            sensors: Sensors::from_machine(machine),
             shares: machine.belt_shares(),
             k: 0,
             halfway: false,
@@ -143,7 +143,7 @@ pub struct Stepped {
 impl Stepped {
     /// The controllers of `design` on `machine`, their first sample at time zero.
     pub fn new(design: &Design, machine: &Machine) -> Result<Self> {
-        let timing = Loop::of(design);
+        let timing = Loop::new(design);
         timing.check(timing.every)?;
         Ok(Self { controllers: Standard::of_drives(design, machine)?, clocked: Clocked::new(machine, timing) })
     }

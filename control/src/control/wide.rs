@@ -15,7 +15,7 @@ pub(super) struct Wide {
 }
 
 impl Wide {
-    pub(super) fn of(machine: &Machine, profiles: &[Profile]) -> Self {
+    pub(super) fn new(machine: &Machine, profiles: &[Profile]) -> Self {
         let slides = machine.geometry().slides;
         let names = |slide: &SlideAt| {
             let key = machine.geometry().label(slide.body).key;

@@ -123,7 +123,7 @@ fn curves(
     delay: f64,
     frfs: &[(&Frf, &[(f64, f64)])],
 ) -> Result<Vec<Vec<Complex<f64>>>> {
-    let system = System::of(machine, known.operation())?;
+    let system = System::new(machine, known.operation())?;
     let mut all = Vec::new();
     // All outputs of an input at once.
     for same in frfs.chunk_by(|(a, _), (b, _)| a.drive == b.drive && a.name == b.name) {
@@ -278,7 +278,7 @@ pub fn fit(machine: &Machine, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
     let grown = |j: usize| (x[j].exp(), [(x[j] - wide(j)).exp(), (x[j] + wide(j)).exp()]);
     let delay = x[2].max(0.0);
     let found = changed(machine, known, &x)?;
-    let mode = StateSpace::of(&found, known.operation()).and_then(|system| system.poles()).ok().and_then(|poles| {
+    let mode = StateSpace::new(&found, known.operation()).and_then(|system| system.poles()).ok().and_then(|poles| {
         let swinging = poles.into_iter().filter(|pole| pole.im > 0.0 && pole.re.abs() < 0.7 * pole.norm());
         swinging.min_by(|a, b| a.norm().total_cmp(&b.norm()))
     });

@@ -88,7 +88,7 @@ pub(super) struct Row {
 
 impl Spectra {
     /// Spectra of these logs combined. Errors: uneven samples, missing values, too few segments, logs that differ.
-    pub fn of(logs: &[&Log], cut: &Cut) -> Result<Self> {
+    pub fn new(logs: &[&Log], cut: &Cut) -> Result<Self> {
         let name = logs.iter().map(|log| log.name.as_str()).collect::<Vec<_>>().join(", ");
         let place = format!("log \"{name}\"");
         let wrong = |what: String| Error::new(what).in_file(&place);

@@ -85,12 +85,12 @@ impl<'a> Analysis<'a> {
     /// use taut::case::{Case, TEMPLATE};
     /// use taut::linear::{Analysis, Question};
     /// let case = Case::from_text("axis.toml", TEMPLATE)?;
-    /// let analysis = Analysis::of(&case, &Question { sample_time: Some(1e-3), ..Question::default() })?;
+    /// let analysis = Analysis::new(&case, &Question { sample_time: Some(1e-3), ..Question::default() })?;
     /// assert_eq!(analysis.inputs[0].discrete.as_ref().unwrap().sample_time, 1e-3);
-    /// assert!(Analysis::of(&case, &Question { from: Some(10.0), to: Some(1.0), ..Question::default() }).is_err());
+    /// assert!(Analysis::new(&case, &Question { from: Some(10.0), to: Some(1.0), ..Question::default() }).is_err());
     ///
     /// let case = Case::read_with("../stages/h-frame/h-frame.toml", &[])?;
-    /// let analysis = Analysis::of(&case, &Question::default())?;
+    /// let analysis = Analysis::new(&case, &Question::default())?;
     /// let modes = analysis.modes.unwrap();
     /// assert_eq!((analysis.inputs.len(), modes.rigid.len(), modes.elastic.len()), (2, 2, 2));
     /// assert!((modes.elastic[0].hertz() - 196.643946994).abs() < 1e-9);
@@ -98,7 +98,7 @@ impl<'a> Analysis<'a> {
     /// assert!(analysis.map.is_none());
     /// # Ok::<(), taut::Error>(())
     /// ```
-    pub fn of(case: &'a Case, question: &Question) -> Result<Self> {
+    pub fn new(case: &'a Case, question: &Question) -> Result<Self> {
         let machine = &case.machine;
         numbers(question)?;
         within_travel(machine, question.at, question.bridge)?;
@@ -109,7 +109,7 @@ impl<'a> Analysis<'a> {
             bridge: question.bridge.unwrap_or(usual.bridge),
             held: held(machine, &question.held)?,
         };
-        let system = System::of(machine, operation).map_err(|error| error.in_file("--at"))?;
+        let system = System::new(machine, operation).map_err(|error| error.in_file("--at"))?;
         let each: Vec<StateSpace> = (0..system.inputs.len()).map(|input| system.input(input)).collect();
         let transfers = each.iter().map(StateSpace::transfers).collect::<Result<Vec<_>>>()?;
         let frequencies = frequencies(&transfers.concat(), question)?;
@@ -124,7 +124,7 @@ impl<'a> Analysis<'a> {
         let inputs = each.into_iter().zip(transfers).map(by_input).collect::<Result<Vec<_>>>()?;
         let everything_slides = question.held.is_empty();
         let at = machine.without_strain(&operation.coordinates(machine), &[]).position;
-        let modes = everything_slides.then(|| Natural::of(&machine.mechanism(), &at));
+        let modes = everything_slides.then(|| Natural::new(&machine.mechanism(), &at));
         Ok(Self {
             case,
             operation,
@@ -136,7 +136,7 @@ impl<'a> Analysis<'a> {
             sticks: sticks(machine, operation),
             here: place(machine, operation)?,
             travel: places(machine, PLACES).map(|places| travel(machine, operation, &places)).transpose()?,
-            map: ResonanceMap::of(machine)?,
+            map: ResonanceMap::new(machine)?,
         })
     }
 }

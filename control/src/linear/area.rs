@@ -20,7 +20,7 @@ pub struct ResonanceMap {
 
 impl ResonanceMap {
     /// Map of a machine with a bridge, if its spans follow bridge and cart, or the bridge yaws, and both have a travel.
-    pub fn of(machine: &Machine) -> Result<Option<Self>> {
+    pub fn new(machine: &Machine) -> Result<Option<Self>> {
         let changes = machine.belt.following().is_some() || machine.yaw.is_some();
         let bridge = machine.bridge.as_ref().filter(|_| changes);
         let (Some(bridge), Some(cart)) = (bridge.and_then(|bridge| bridge.travel), machine.cart.travel) else {

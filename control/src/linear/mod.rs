@@ -1,6 +1,6 @@
 //! Linear analysis of a machine.
 //!
-//! [`StateSpace::of`] gives the equations of a sliding machine as ẋ = A x + b u, y = C x + d u, from the forms that the
+//! [`StateSpace::new`] gives the equations of a sliding machine as ẋ = A x + b u, y = C x + d u, from the forms that the
 //! solvers use. From these follow [poles](StateSpace::poles), [zeros](StateSpace::zeros), [`Response`] over frequency,
 //! resonance and anti-resonance [along the travel](travel), and [`Discrete`] models for a sample time.
 //!
@@ -72,7 +72,7 @@ pub enum Root {
 
 impl Root {
     /// Roots for each real value and each pair, in the order given.
-    pub fn of(values: &[Complex<f64>]) -> Vec<Root> {
+    pub fn from_values(values: &[Complex<f64>]) -> Vec<Root> {
         let one = |value: &Complex<f64>| match *value {
             v if v.im > 0.0 => Some(Root::Pair { frequency: v.norm(), damping: -v.re / v.norm() }),
             v if v.im < 0.0 => None,

@@ -104,21 +104,21 @@ pub(super) struct Inner<B> {
 }
 
 impl System {
-    /// Linear equations of `machine` about `operation`, for all inputs; [`StateSpace::of`] has those of the first input
+    /// Linear equations of `machine` about `operation`, for all inputs; [`StateSpace::new`] has those of the first input
     /// alone.
     ///
     /// ```
     /// use taut::case::Case;
     /// use taut::linear::{Operation, System};
     /// let case = Case::read("../stages/core-xy/core-xy.toml")?;
-    /// let gantry = System::of(&case.machine, Operation::default())?;
+    /// let gantry = System::new(&case.machine, Operation::default())?;
     /// assert_eq!(gantry.inputs.len(), 2);
     /// // Motors A and B pull the cart along y in opposite ways, and the bridge along x alike.
     /// let rate = |output: &str, input: usize| gantry.input(input).output(output).unwrap();
     /// assert_eq!(rate("bridge_position", 0), rate("bridge_position", 1));
     /// # Ok::<(), taut::Error>(())
     /// ```
-    pub fn of(machine: &Machine, operation: Operation) -> Result<Self> {
+    pub fn new(machine: &Machine, operation: Operation) -> Result<Self> {
         let machine = placed(machine, operation)?;
         let plant = machine.mechanism();
         within_supply(&machine, &plant, operation.speed)?;
@@ -213,7 +213,7 @@ impl StateSpace {
     /// use taut::linear::{Operation, StateSpace};
     ///
     /// let case = Case::from_text("axis.toml", TEMPLATE)?;
-    /// let axis = StateSpace::of(&case.machine, Operation::default())?;
+    /// let axis = StateSpace::new(&case.machine, Operation::default())?;
     /// assert_eq!(axis.states.len(), 6);
     /// // One integrator, and all else dies away.
     /// let poles = axis.poles()?;
@@ -221,8 +221,8 @@ impl StateSpace {
     /// assert!(poles.iter().all(|p| p.re <= 0.0));
     /// # Ok::<(), taut::Error>(())
     /// ```
-    pub fn of(machine: &Machine, operation: Operation) -> Result<Self> {
-        Ok(System::of(machine, operation)?.into_input(0))
+    pub fn new(machine: &Machine, operation: Operation) -> Result<Self> {
+        Ok(System::new(machine, operation)?.into_input(0))
     }
 
     /// Index of the output with this name.
@@ -235,7 +235,7 @@ impl StateSpace {
 fn within_supply(machine: &Machine, plant: &Mechanism, speed: f64) -> Result<()> {
     let is_limited = |drive: &Drive| {
         let turning = speed / plant.bodies[drive.shaft].kind.lever();
-        Phases::of(drive).is_some_and(|phases| phases.without_load(turning).is_none())
+        Phases::new(drive).is_some_and(|phases| phases.without_load(turning).is_none())
     };
     if !plant.drives.iter().any(is_limited) {
         return Ok(());
@@ -294,7 +294,7 @@ fn mode(plant: &Mechanism, held: &[bool], speed: f64) -> Mode {
         (_, _, true) => Motion::Forward,
         (_, _, false) => Motion::Backward,
     });
-    let mut mode = Mode::of(motion).with_torque(forward);
+    let mut mode = Mode::new(motion).with_torque(forward);
     // A piecewise linear force over speed is linearised, one over position stays constant.
     for (index, spring) in plant.springs.iter().enumerate() {
         if let SpringLaw::Line { over: Over::Rate, line } = &spring.law {

@@ -89,14 +89,14 @@ impl Natural {
     /// use taut::case::{Case, TEMPLATE};
     /// use taut::linear::Natural;
     /// let case = Case::from_text("axis.toml", TEMPLATE)?;
-    /// let modes = Natural::of(&case.machine.mechanism(), &[0.0; 6])?;
+    /// let modes = Natural::new(&case.machine.mechanism(), &[0.0; 6])?;
     /// // An axis moves as a whole, and swings in two ways.
     /// assert_eq!((modes.rigid.len(), modes.elastic.len()), (1, 2));
     /// assert!(modes.elastic[0].hertz() > 100.0);
     /// # Ok::<(), taut::Error>(())
     /// ```
-    pub fn of(mechanism: &Mechanism, position: &[f64; BODIES]) -> Result<Self> {
-        let matrices = Matrices::of(mechanism, position);
+    pub fn new(mechanism: &Mechanism, position: &[f64; BODIES]) -> Result<Self> {
+        let matrices = Matrices::new(mechanism, position);
         let (values, vectors) = matrices.modes()?;
         // q = Φ η with Φᵀ M Φ = 1, rigid modes first.
         let shapes = matrices.shapes(&vectors)?;
@@ -135,17 +135,17 @@ impl Natural {
 
     /// Undamped frequencies of the elastic modes alone, Hz, the lowest first.
     pub fn frequencies(mechanism: &Mechanism, position: &[f64; BODIES]) -> Result<Vec<f64>> {
-        let matrices = Matrices::of(mechanism, position);
+        let matrices = Matrices::new(mechanism, position);
         let (values, _) = matrices.modes()?;
         Ok(values[matrices.free..].iter().map(|value| value.sqrt() / (2.0 * PI)).collect())
     }
 }
 
 impl Matrices {
-    fn of(mechanism: &Mechanism, position: &[f64; BODIES]) -> Self {
+    fn new(mechanism: &Mechanism, position: &[f64; BODIES]) -> Self {
         let bodies: Vec<usize> = mechanism.leaders().collect();
         let n = bodies.len();
-        let free = Mode::of([Motion::Free; BODIES]);
+        let free = Mode::new([Motion::Free; BODIES]);
         let inertia = mechanism.equations(free).inertia;
         let mass = |&leader: &usize| {
             mechanism.followers(leader).map(|body| mechanism.ratio(body).powi(2) * inertia[body]).sum::<f64>()
@@ -168,7 +168,7 @@ impl Matrices {
         }
         let field = |drive: usize| {
             let (angle, _) = mechanism.angle_of(drive)?;
-            Some((angle, Phases::of(&mechanism.drives[drive])?.stiffness()))
+            Some((angle, Phases::new(&mechanism.drives[drive])?.stiffness()))
         };
         let fields: Vec<(usize, f64)> = (0..mechanism.drives.len()).filter_map(field).collect();
         let mut stiffness = DMatrix::zeros(n, n);
@@ -275,7 +275,7 @@ fn poles(values: &[f64], damping: &DMatrix<f64>, free: usize) -> Result<Vec<Root
         (false, false) => 0.0,
     });
     let mut poles = vec![Root::Zero; free];
-    poles.extend(Root::of(&eigen::eigenvalues(&a)?));
+    poles.extend(Root::from_values(&eigen::eigenvalues(&a)?));
     Ok(poles)
 }
 

@@ -103,10 +103,10 @@ pub struct Range {
 
 impl Range {
     /// From a third of the slowest to three times the fastest of poles and zeros, to the full decade.
-    pub fn of(poles: &[Complex<f64>], zeros: &[Zeros]) -> Self {
+    pub fn new(poles: &[Complex<f64>], zeros: &[Zeros]) -> Self {
         let all = || poles.iter().chain(zeros.iter().flat_map(|z| &z.values)).map(|v| v.norm()).filter(|v| *v > 0.0);
         // Distant zeros of a lightly damped belt and poles of bristles are not included by default.
-        let swings = Root::of(poles).into_iter().filter_map(|root| match root {
+        let swings = Root::from_values(poles).into_iter().filter_map(|root| match root {
             Root::Pair { frequency, .. } => Some(frequency),
             _ => None,
         });
@@ -128,7 +128,7 @@ impl Range {
         let poles = transfers.first().map_or(&[][..], |transfer| &transfer.poles);
         let zeros: Vec<_> = transfers.iter().map(|transfer| transfer.zeros.clone()).collect();
         let roots = poles.iter().chain(zeros.iter().flat_map(|zeros| &zeros.values)).copied().collect();
-        (Self::of(poles, &zeros), roots)
+        (Self::new(poles, &zeros), roots)
     }
 
     /// The frequencies, rad/s, ascending; each pair among `roots` has additional points, so that its peak or dip is

@@ -55,8 +55,11 @@ pub fn travel(machine: &Machine, operation: Operation, positions: &[f64]) -> Res
     let is_of_currents = |root: &Root| matches!(root, Root::Pair { damping, .. } if has_stepper && *damping > STILL);
     let place = |&position: &f64| {
         let pairs = |machine: &Machine, about: Operation| -> Result<Vec<Root>> {
-            let poles = StateSpace::of(machine, Operation { position, ..about })?.poles()?;
-            Ok(Root::of(&poles).into_iter().filter(|root| root.hertz().is_some() && !is_of_currents(root)).collect())
+            let poles = StateSpace::new(machine, Operation { position, ..about })?.poles()?;
+            Ok(Root::from_values(&poles)
+                .into_iter()
+                .filter(|root| root.hertz().is_some() && !is_of_currents(root))
+                .collect())
         };
         let hertz = |roots: Vec<Root>| roots.into_iter().filter_map(Root::hertz).collect();
         let held = placed(machine, Operation { position, ..operation })?;

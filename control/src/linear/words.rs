@@ -54,7 +54,7 @@ fn differences_of_modes(machine: &Machine, plant: &Mechanism, operation: Operati
     if machine.drives.iter().any(is_sluggish) {
         words.push("the damping of the modes does not include motors with an inductance; the poles do".into());
     }
-    if plant.drives.iter().filter_map(Phases::of).any(|phases| phases.regulator.is_none()) {
+    if plant.drives.iter().filter_map(Phases::new).any(|phases| phases.regulator.is_none()) {
         words.push("the damping of the modes does not include the phases of the motor; the poles do".into());
     }
     if operation.speed == 0.0 && machine.stepper().is_some_and(|stepper| stepper.detent_torque > 0.0) {
@@ -104,7 +104,7 @@ fn forces(machine: &Machine, plant: &Mechanism, operation: Operation, moving: &[
 
 /// Assumptions about steppers, in one sentence for all.
 fn steppers(machine: &Machine, plant: &Mechanism, operation: Operation) -> Option<String> {
-    let (phases, stepper) = plant.drives.iter().find_map(|drive| Phases::of(drive).zip(drive.motor.stepper))?;
+    let (phases, stepper) = plant.drives.iter().find_map(|drive| Phases::new(drive).zip(drive.motor.stepper))?;
     let detent = if operation.speed == 0.0 { 4.0 * stepper.teeth() * stepper.detent_torque } else { 0.0 };
     let stiffness = engineering_typed(phases.stiffness() - detent, "N m/rad", 4);
     let whose = if machine.drives.len() > 1 { "each field" } else { "the field" };

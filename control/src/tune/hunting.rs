@@ -195,7 +195,7 @@ pub(super) fn integral_times(design: &Design, factor: f64) -> Option<Design> {
 
 /// Observation time, s: a multiple of the time in which the integral moves the command from one breakaway to the other.
 fn watch(machine: &Machine, design: &Design) -> f64 {
-    let rigid = Rigid::of(machine);
+    let rigid = Rigid::new(machine);
     let dry: f64 = rigid.coulomb.iter().sum();
     let count = machine.encoder.map_or(1e-6, |encoder| {
         let length = if crate::control::measures_cart(machine) { 1.0 } else { machine.pulley_radius };
@@ -235,7 +235,7 @@ impl ObservedSwing {
         if machine.drives.len() > 1 {
             return None;
         }
-        let (rigid, r) = (Rigid::of(machine), machine.pulley_radius);
+        let (rigid, r) = (Rigid::new(machine), machine.pulley_radius);
         let most = |side: &Side| side.coulomb.max(side.breakaway);
         let of = |friction: &crate::friction::Friction| most(&friction.forward).max(most(&friction.backward));
         let pulleys = (of(&machine.drive_pulley.friction) + of(&machine.idler_pulley.friction)) / r;
@@ -292,7 +292,7 @@ fn seen(
         }
         Flow::Continue
     };
-    let (timing, solver) = (Loop::of(design), Solver::of(machine));
+    let (timing, solver) = (Loop::new(design), Solver::for_machine(machine));
     let samples = recorded(machine, &mut each(&mut controllers), (&timing, &profiles), until, solver, &mut take)?;
     // The last eighth of the observation.
     let late = samples.iter().filter(|sample| sample.drive == 0 && sample.time >= until - 0.125 * watched);

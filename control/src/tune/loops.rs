@@ -307,7 +307,7 @@ fn pushed<const N: usize, const M: usize>(
     omega: f64,
 ) -> [SMatrix<Complex<f64>, M, M>; 2] {
     let answer = sampled.at(omega);
-    let open = Open::of(sampled, &answer, feedback, &Turn::of(omega, plant.every));
+    let open = Open::of(sampled, &answer, feedback, &Turn::new(omega, plant.every));
     // y = G_y D Δ⁻¹ v
     let measured = over(&(answer.position * open.own), &open.adjugate, open.difference);
     let slides = plant.kind.geometry().slides;

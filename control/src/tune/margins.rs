@@ -283,7 +283,7 @@ impl<'a, const N: usize> Curve<'a, N> {
     }
 
     fn at(&self, omega: f64) -> Open<N> {
-        Open::of(self.sampled, &self.sampled.at(omega), self.feedback, &Turn::of(omega, self.plant.every))
+        Open::of(self.sampled, &self.sampled.at(omega), self.feedback, &Turn::new(omega, self.plant.every))
     }
 
     /// Adds points between those whose L or 1 + L differ in phase by more than [`TURN`].
@@ -309,7 +309,7 @@ impl<'a, const N: usize> Curve<'a, N> {
     fn is_stable(&self) -> bool {
         let mut winding = Winding::new(self.plant, self.feedback, N);
         for (omega, open) in &self.points {
-            winding.go_on(*omega, open.difference, &Turn::of(*omega, self.plant.every));
+            winding.go_on(*omega, open.difference, &Turn::new(*omega, self.plant.every));
         }
         winding.is_stable()
     }

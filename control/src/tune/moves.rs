@@ -85,7 +85,7 @@ fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
 
 /// Speed (m/s) and acceleration (m/s²) with a reserve below the limits of controller and amplifier.
 fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
-    let rigid = Rigid::of(machine);
+    let rigid = Rigid::new(machine);
     let Some(limit) = limit(machine, design) else { return MODEST };
     let dry = rigid.coulomb[0];
     let push = |speed: f64| rigid.command(dry + rigid.viscous[0] * speed, 0.0, &Reference::steady(speed)).abs();
@@ -106,7 +106,7 @@ fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
 pub fn asked(machine: &Machine, motion: &Move) -> f64 {
     let whole = FeedForward { model: FeedForwardModel::Rigid, ..FeedForward::NONE };
     let of_drive = |drive: usize| {
-        let mean = match Forward::of(whole, machine, drive) {
+        let mean = match Forward::new(whole, machine, drive) {
             Some(forward) => mean_square(motion, |time| {
                 let slides: Vec<Reference> = motion.profiles.iter().map(|profile| profile.at(time)).collect();
                 forward.electrical(&slides).0

@@ -69,7 +69,7 @@ pub(super) struct Runner {
 impl Runner {
     /// Objective of a design for a model of the axis.
     pub fn new(model: &Machine, design: &Design) -> Result<Self> {
-        Ok(Self { controllers: Standard::of_drives(design, model)?, timing: Loop::of(design) })
+        Ok(Self { controllers: Standard::of_drives(design, model)?, timing: Loop::new(design) })
     }
 
     /// A move on one machine with a shaped profile.
@@ -77,15 +77,21 @@ impl Runner {
         let seen = (motion.until, motion.window);
         let controllers = &mut each(&mut self.controllers);
         let (figures, ending) =
-            closed_loop_briefly(machine, controllers, &self.timing, shaped, seen, Solver::of(machine))?;
+            closed_loop_briefly(machine, controllers, &self.timing, shaped, seen, Solver::for_machine(machine))?;
         Ok(figures_of(&figures, ending, motion))
     }
 
     /// Figures of a move at samples only, in a third of the time.
     pub(crate) fn glance(&mut self, machine: &Machine, motion: &Move, shaped: &[Profile]) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
-        let (figures, ending) =
-            closed_loop_at_samples(machine, &mut self.controllers, &self.timing, shaped, seen, Solver::of(machine))?;
+        let (figures, ending) = closed_loop_at_samples(
+            machine,
+            &mut self.controllers,
+            &self.timing,
+            shaped,
+            seen,
+            Solver::for_machine(machine),
+        )?;
         Ok(figures_of(&figures, ending, motion))
     }
 }

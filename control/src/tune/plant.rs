@@ -90,7 +90,7 @@ pub(super) struct Sampled<const N: usize> {
 impl Plant {
     /// Samples `machine` about `operation` with the timing of `design`.
     pub fn of(machine: &Machine, operation: Operation, design: &Design, corners: &[f64]) -> Result<Self> {
-        let system = System::of(machine, operation)?;
+        let system = System::new(machine, operation)?;
         let model = |drive: usize| system.input(drive).discrete(design.every, Hold::Zero, design.delay);
         match machine.drives.len() {
             1 => Self::sampled([model(0)?], &system.input(0), machine, corners, |sampled| {
@@ -132,7 +132,7 @@ impl Plant {
             models,
         };
         let unstable = sampled.models[0].poles().iter().filter(|z| z.norm() > 1.0 + 1e-9).count();
-        let turns = frequency.iter().map(|&omega| Turn::of(omega, t)).collect();
+        let turns = frequency.iter().map(|&omega| Turn::new(omega, t)).collect();
         sampled.answers = frequency.iter().map(|&omega| sampled.at(omega)).collect();
         Ok(Self { frequency, turns, every: t, unstable, kind: machine.kind, of: of(sampled) })
     }

@@ -145,7 +145,7 @@ impl Work<'_> {
         let mut moves = Vec::new();
         for (motion, seen) in self.moves.iter().zip(all) {
             let (machine, until, window) = (&self.case.machine, motion.until, motion.window);
-            let (profiles, solver) = (&motion.profiles, Solver::of(machine));
+            let (profiles, solver) = (&motion.profiles, Solver::for_machine(machine));
             let own = closed_loop(&Setup { machine, model: machine, design, profiles, until, window, solver })?;
             let at_worst = AtWorst::of(&seen, left_out);
             moves.push(MoveVerdict {

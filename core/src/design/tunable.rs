@@ -136,7 +136,7 @@ impl Tunable for Pid {
     }
 
     fn placed(&self, _: &Design, machine: &Machine, bandwidth: f64, damping: f64) -> Option<Structure> {
-        let rigid = Rigid::of(machine);
+        let rigid = Rigid::new(machine);
         let (mass, w) = (rigid.mass, 2.0 * PI * bandwidth);
         let (drag, push) = (rigid.drag(), rigid.force_per_command().abs());
         let sign = rigid.force_per_command().signum();
@@ -159,7 +159,7 @@ impl Tunable for Pid {
     /// S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", Journal of Process Control
     /// 13 (2003).
     fn starts(&self, design: &Design, machine: &Machine) -> Vec<Structure> {
-        let rigid = Rigid::of(machine);
+        let rigid = Rigid::new(machine);
         let late = design.delay + 0.5 * design.every + 1.0 / (2.0 * PI * self.filter);
         let (drag, push) = (rigid.drag(), rigid.force_per_command());
         // M ẍ + d ẋ = g u:  k = g/d, τ = M/d; without drag k/τ is what counts.
@@ -238,7 +238,7 @@ impl Tunable for Cascade {
     }
 
     fn placed(&self, design: &Design, machine: &Machine, bandwidth: f64, damping: f64) -> Option<Structure> {
-        let rigid = Rigid::of(machine);
+        let rigid = Rigid::new(machine);
         let (mass, w) = (rigid.mass, 2.0 * PI * bandwidth);
         let speed = CASCADE * w;
         let current = self.current.map(|inner| {

@@ -118,7 +118,7 @@ pub enum Lever {
 
 impl Lever {
     /// Its length on pulleys of radius `r`.
-    pub fn of(self, r: f64) -> f64 {
+    pub fn factor(self, r: f64) -> f64 {
         match self {
             Lever::Radius(weight) => weight * r,
             Lever::One(weight) => weight,

@@ -50,7 +50,7 @@ mod tests {
 
     /// The arms of a span for these positions of the bodies.
     fn length(span: &SpanAt, r: f64, at: &[f64; BODIES]) -> f64 {
-        span.arms.iter().map(|(body, arm)| arm.of(r) * at[*body]).sum()
+        span.arms.iter().map(|(body, arm)| arm.factor(r) * at[*body]).sum()
     }
 
     #[test]

@@ -130,7 +130,7 @@ const OF_DUAL_BELT: [Quantity; 18] = [
 
 impl Quantity {
     /// Quantities of a kind of machine, in the order of a log.
-    pub const fn of(kind: MachineKind) -> &'static [Quantity] {
+    pub const fn for_kind(kind: MachineKind) -> &'static [Quantity] {
         match kind {
             MachineKind::Axis => &OF_AXIS,
             MachineKind::HFrame | MachineKind::CoreXy => &OF_GANTRY,
@@ -252,7 +252,7 @@ impl Geometry {
 impl Machine {
     /// Quantities that its logs can contain.
     pub fn quantities(&self) -> &'static [Quantity] {
-        Quantity::of(self.kind)
+        Quantity::for_kind(self.kind)
     }
 
     /// Quantities counted by its encoder: one for each drive, or the cart's; before a gear also the rotor's.
@@ -296,7 +296,7 @@ mod tests {
         }
         for kind in MachineKind::ALL {
             let geometry = kind.geometry();
-            for quantity in Quantity::of(kind).iter().filter(|quantity| quantity.is_position()) {
+            for quantity in Quantity::for_kind(kind).iter().filter(|quantity| quantity.is_position()) {
                 assert_eq!(geometry.by_slides(*quantity, 0.02).len(), geometry.slides.len(), "{}", quantity.name());
             }
         }

@@ -174,7 +174,7 @@ impl Machine {
             let there = self.span_alike(index) == Some(index);
             Spring {
                 label: at.label,
-                arms: self.with_yaw(at.arms.iter().map(|&(body, arm)| (body, arm.of(self.pulley_radius))), at),
+                arms: self.with_yaw(at.arms.iter().map(|&(body, arm)| (body, arm.factor(self.pulley_radius))), at),
                 stiffness: if there { k[index] } else { 0.0 },
                 damping: if there { c[index] } else { 0.0 },
                 law: if there { law.clone() } else { SpringLaw::None },

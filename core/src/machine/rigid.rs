@@ -38,7 +38,7 @@ pub struct Rigid {
 
 impl Rigid {
     /// Rigid model of an axis; for several drives, the share of each one when all move the heaviest slide.
-    pub fn of(machine: &Machine) -> Self {
+    pub fn new(machine: &Machine) -> Self {
         if machine.drives.len() == 1 {
             return Self::of_drive(machine, 0);
         }
@@ -265,7 +265,7 @@ impl Rigid {
     /// ```
     /// use taut::{case::Case, machine::rigid::Rigid};
     /// # let text = taut::case::TEMPLATE;
-    /// let rigid = Rigid::of(&Case::from_text("axis.toml", text)?.machine);
+    /// let rigid = Rigid::new(&Case::from_text("axis.toml", text)?.machine);
     /// let [short, long] = [0.01, 0.04].map(|distance| rigid.quickest(distance, (Some(24.0), None)).unwrap());
     /// assert!(short < long && long < 4.0 * short);
     /// # Ok::<(), taut::Error>(())

@@ -305,7 +305,7 @@ impl SimpleDrive {
     }
 
     /// The simple drive that `motor` represents, if any.
-    pub fn of(motor: &Motor, r: f64) -> Option<Self> {
+    pub fn new(motor: &Motor, r: f64) -> Option<Self> {
         let force = motor.torque_constant / r;
         motor.is_simple.then(|| Self { force, drag: motor.back_emf_constant * force / r })
     }
@@ -355,7 +355,7 @@ mod tests {
     fn a_simple_drive_is_the_motor_that_it_stands_for() {
         let drive = SimpleDrive { force: 0.65, drag: 12.0 };
         let motor = drive.motor(0.015);
-        let back = SimpleDrive::of(&motor, 0.015).unwrap();
+        let back = SimpleDrive::new(&motor, 0.015).unwrap();
         assert!((back.force - 0.65).abs() < 1e-15 && (back.drag - 12.0).abs() < 1e-13);
         let [u, v, r] = [3.0, 0.1, 0.015];
         let current = (u - motor.back_emf_constant * v / r) / motor.resistance;

@@ -14,7 +14,7 @@ const NOTHING: f64 = 1e-9;
 pub fn slowest_swing(mechanism: &Mechanism) -> Option<f64> {
     let bodies: Vec<usize> = mechanism.leaders().filter(|&body| !mechanism.bodies[body].is_rotor).collect();
     let n = bodies.len();
-    let inertia = mechanism.equations(Mode::of([Motion::Free; BODIES])).inertia;
+    let inertia = mechanism.equations(Mode::new([Motion::Free; BODIES])).inertia;
     let mut mass = DVector::from_iterator(
         n,
         bodies.iter().map(|&leader| {

@@ -29,7 +29,7 @@ impl Mechanism {
             v if v < 0.0 => Motion::Backward,
             _ => Motion::Stuck,
         });
-        Mode { piece: self.pieces(state), ..Mode::of(motion) }
+        Mode { piece: self.pieces(state), ..Mode::new(motion) }
     }
 
     /// Adapts a mode to a machine with the same parts but other parameters: a body that gains or loses dry friction

@@ -40,7 +40,7 @@ impl DriveMode {
 impl Mode {
     /// Mode with these motions of the bodies, in order, and all other parts in their ordinary case; further bodies are
     /// free.
-    pub fn of(motion: impl IntoIterator<Item = Motion>) -> Self {
+    pub fn new(motion: impl IntoIterator<Item = Motion>) -> Self {
         let mut mode = Self {
             motion: [Motion::Free; BODIES],
             slack: [false; SPRINGS],
@@ -167,7 +167,7 @@ pub struct Part {
 
 impl Part {
     /// A part of a mechanism, with its name.
-    pub fn of(mechanism: &Mechanism, what: What) -> Self {
+    pub fn new(mechanism: &Mechanism, what: What) -> Self {
         let label = match what {
             What::Body(body) => mechanism.bodies[body].label,
             What::Span(spring) | What::Gap(spring) | What::Line(spring) => mechanism.springs[spring].label,

@@ -66,7 +66,7 @@ pub struct Steady {
 
 impl Phases {
     /// Phases of a drive; none for a brushed motor.
-    pub fn of(drive: &Drive) -> Option<Self> {
+    pub fn new(drive: &Drive) -> Option<Self> {
         Self::of_motor(&drive.motor, &drive.amplifier)
     }
 
@@ -228,7 +228,7 @@ impl Mechanism {
     /// Equations of a stepper for small motions about this speed of its shaft, rad/s; none for a brushed motor, and
     /// where [`Phases::without_load`] has no current.
     pub fn steady(&self, drive: usize, speed: f64) -> Option<Steady> {
-        let (phases, (spring, _)) = Phases::of(&self.drives[drive]).zip(self.angle_of(drive))?;
+        let (phases, (spring, _)) = Phases::new(&self.drives[drive]).zip(self.angle_of(drive))?;
         let (first, shaft) = (self.first_current(drive), Form::speed(self.drives[drive].shaft));
         let ([u, rate, emf], n, k) = (phases.turning(), phases.teeth, phases.torque_constant);
         let (along, behind) = phases.without_load(speed)?;
@@ -269,7 +269,7 @@ impl Mechanism {
     /// Sets the phase currents of steppers that hold the rotor in its position.
     pub(super) fn energise(&self, state: &mut State) {
         for (number, drive) in self.drives.iter().enumerate() {
-            if let Some(phases) = Phases::of(drive) {
+            if let Some(phases) = Phases::new(drive) {
                 let first = self.first_current(number);
                 state.current[first..first + 2].copy_from_slice(&phases.at_rest(state.position[drive.shaft]));
             }

@@ -112,7 +112,7 @@ pub struct Extras {
 
 impl Extras {
     /// Those of a machine.
-    pub fn of(machine: &Machine) -> Self {
+    pub fn new(machine: &Machine) -> Self {
         Self { stepper: machine.stepper().is_some(), yaw: machine.yaw.is_some() }
     }
 }
@@ -225,7 +225,7 @@ pub struct Figure {
 
 impl Figure {
     /// Its value.
-    pub fn of(&self, metrics: &Metrics) -> Worth {
+    pub fn value(&self, metrics: &Metrics) -> Worth {
         (self.row.of)(metrics, self.place)
     }
 

@@ -49,7 +49,7 @@ struct Places {
 }
 
 impl Places {
-    fn of(machine: &Machine, mechanism: &Mechanism) -> Self {
+    fn new(machine: &Machine, mechanism: &Mechanism) -> Self {
         let geometry = machine.geometry();
         let find = |wanted: Shown| mechanism.readings.iter().position(|shown| *shown == wanted);
         let place = |wanted: Shown| find(wanted).map_or(PeakSource::Sum(usize::MAX), |q| PeakSource::Reading(q, 1.0));
@@ -145,13 +145,13 @@ pub struct Sought {
 impl Sought {
     /// All quantities with figures.
     pub fn all(machine: &Machine, mechanism: &Mechanism) -> Self {
-        Self::of(machine, mechanism, &Seek::ALL.map(|seek| (seek, None)))
+        Self::new(machine, mechanism, &Seek::ALL.map(|seek| (seek, None)))
     }
 
     /// Only these quantities, each for one or all parts of its role, and values at the end: other peaks and speeds keep
     /// their initial values and cost nothing.
-    pub fn of(machine: &Machine, mechanism: &Mechanism, seeks: &[(Seek, Option<usize>)]) -> Self {
-        let places = Places::of(machine, mechanism);
+    pub fn new(machine: &Machine, mechanism: &Mechanism, seeks: &[(Seek, Option<usize>)]) -> Self {
+        let places = Places::new(machine, mechanism);
         let (mut readings, mut sums) = ([false; QUANTITIES], false);
         for &(seek, part) in seeks {
             for (number, place) in places.sought(seek).iter().enumerate() {
@@ -193,7 +193,7 @@ impl Sought {
 /// # "#;
 /// let case = Case::from_text("frame.toml", text)?;
 /// let mechanism = case.machine.mechanism();
-/// let course = Course::of(&mechanism, &case.experiments[0]);
+/// let course = Course::new(&mechanism, &case.experiments[0]);
 /// let mut meter = Meter::new(&case.machine, &case.experiments[0]);
 /// let rows = &mut |_: &taut::trajectory::Trajectory| Flow::Continue;
 /// let outcome = stream_mechanism(&mechanism, &course, Solver::Exact, (Detail::None, Some(&mut meter)), rows)?;
@@ -436,18 +436,18 @@ impl Observe for Meter {
         let (lows, highs) = curve.ranges();
         for (q, peak) in self.sought() {
             if highs[q] > peak.value.abs() {
-                let (s, value) = curve.of(q).greatest(0.0, 1.0);
+                let (s, value) = curve.polynomial(q).greatest(0.0, 1.0);
                 peak.take(value, curve.begin + s * curve.length);
             }
             if -lows[q] > peak.value.abs() {
-                let (s, value) = curve.of(q).negative().greatest(0.0, 1.0);
+                let (s, value) = curve.polynomial(q).negative().greatest(0.0, 1.0);
                 peak.take(-value, curve.begin + s * curve.length);
             }
         }
         for (sum, peak) in self.sought.places.sums.iter().zip(&mut self.sums) {
             let mut course = Polynomial::default();
             for &(q, weight) in sum {
-                course.add(&curve.of(q), weight);
+                course.add(&curve.polynomial(q), weight);
             }
             if course.bound() > peak.value.abs() {
                 let (s, value) = course.largest(0.0, 1.0);
@@ -455,7 +455,7 @@ impl Observe for Meter {
             }
         }
         if let Some(plateau) = &mut self.plateau {
-            let speed = curve.of(reading::CART_SPEED);
+            let speed = curve.polynomial(reading::CART_SPEED);
             plateau.see((curve.begin, curve.begin + curve.length), &|from| speed.extremes(from, 1.0));
         }
         for (_, rotor) in &mut self.rotors {

@@ -42,7 +42,7 @@ impl Rotor {
     }
 
     pub fn see(&mut self, curve: &Curve) {
-        let speed = curve.of(self.reading);
+        let speed = curve.polynomial(self.reading);
         self.fastest = self.fastest.max(speed.largest(0.0, 1.0).1.abs());
         let slow = RESTING * self.fastest;
         let shifted = |by: f64| {

@@ -110,11 +110,15 @@ impl List {
 impl Field {
     /// An optional number of the machine.
     pub(super) const fn number(get: fn(&Machine, usize) -> Option<f64>, set: fn(&mut Machine, usize, f64)) -> Self {
-        Self::of(Of::Machine, get, set)
+        Self::new(Of::Machine, get, set)
     }
 
     /// A number of each of these owners.
-    pub(super) const fn of(of: Of, get: fn(&Machine, usize) -> Option<f64>, set: fn(&mut Machine, usize, f64)) -> Self {
+    pub(super) const fn new(
+        of: Of,
+        get: fn(&Machine, usize) -> Option<f64>,
+        set: fn(&mut Machine, usize, f64),
+    ) -> Self {
         Self::Machine(Accessor { of, get, set })
     }
 
@@ -139,14 +143,14 @@ impl Field {
 /// A number that every machine, or every axis, has.
 macro_rules! always {
     ($of:ident, |$machine:ident| $($place:tt)*) => {
-        Field::of(Of::$of, |$machine, _| Some($($place)*), |$machine, _, value| $($place)* = value)
+        Field::new(Of::$of, |$machine, _| Some($($place)*), |$machine, _, value| $($place)* = value)
     };
 }
 
 /// A number of an optional part.
 macro_rules! part {
     ($of:ident, |$machine:ident| $part:expr, $reach:expr => $name:ident) => {
-        Field::of(
+        Field::new(
             Of::$of,
             |$machine, _| $part.map(|part| part.$name),
             |$machine, _, value| {
@@ -162,7 +166,7 @@ macro_rules! part {
 /// and A.
 macro_rules! make {
     ($of:ident, |$belt:ident| $applies:expr, |$make:ident, $span:pat_param| $($place:tt)*) => {
-        Field::of(
+        Field::new(
             Of::$of,
             |machine, $span| {
                 let $belt = &machine.belt;
@@ -184,7 +188,7 @@ macro_rules! make {
 /// A number of each motor or amplifier.
 macro_rules! of_drive {
     ($part:ident, |$old:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
-        Field::of(
+        Field::new(
             Of::Drive,
             |machine, drive| {
                 let $old = &machine.drives.get(drive)?.$part;
@@ -239,7 +243,7 @@ macro_rules! stepper {
 /// A number of a drive that is given by force and drag.
 macro_rules! of_simple {
     ($name:ident) => {
-        Field::of(
+        Field::new(
             Of::Axis,
             |machine, _| simple(machine).map(|drive| drive.$name),
             |machine, _, value| set_simple(machine, |drive| drive.$name = value),
@@ -261,7 +265,7 @@ macro_rules! amplifier {
 /// A number of each of several slides.
 macro_rules! of_slide {
     (|$part:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
-        Field::of(
+        Field::new(
             Of::Slide,
             |machine, index| {
                 let $part = machine.slide(index)?;
@@ -311,7 +315,7 @@ macro_rules! of_friction {
         of_friction!(Axis $body, $($how)*)
     };
     ($of:ident $body:ident, |$law:ident| $get:expr, |$new:ident, $value:ident| $set:expr) => {
-        Field::of(
+        Field::new(
             Of::$of,
             |machine, _| {
                 let $law = &machine.$body.friction;
@@ -366,7 +370,7 @@ pub(super) fn set_rated_current(motor: &mut Motor, value: f64) {
 
 /// The drive of an axis given by force and drag, if any.
 pub(super) fn simple(machine: &Machine) -> Option<SimpleDrive> {
-    SimpleDrive::of(&machine.drives.first()?.motor, machine.pulley_radius)
+    SimpleDrive::new(&machine.drives.first()?.motor, machine.pulley_radius)
 }
 
 /// Sets the radius; a drive given by its force keeps that force.
@@ -449,7 +453,7 @@ pub(super) fn set_stribeck_decay(friction: &mut Friction, decay: f64) {
 /// A number of each point of a line of the cart: 0 for the argument, 1 for the value.
 macro_rules! points {
     ($part:literal, |$machine:ident| $($line:tt)*) => {
-        Field::of(
+        Field::new(
             Of::Point(|$machine| $($line)*.as_ref().map_or(0, |line| line.points().len())),
             |$machine, point| $($line)*.as_ref()?.points().get(point).map(|point| point[$part]),
             |$machine, point, value| {

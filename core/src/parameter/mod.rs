@@ -146,7 +146,7 @@ pub enum Arm {
 
 impl Arm {
     /// Its value in a machine.
-    pub fn of(self, stage: &Machine) -> f64 {
+    pub fn length(self, stage: &Machine) -> f64 {
         let power = |base: f64, power: i32| (0..power).fold(1.0, |product, _| product * base);
         match self {
             Arm::One => 1.0,
@@ -325,7 +325,7 @@ pub fn sections() -> impl Iterator<Item = &'static str> {
 /// The weight of a parameter at the drive pulley: r² for a mass or a viscous friction of the cart, r for its Coulomb
 /// friction, n² for the rotor's inertia.
 pub fn at_pulley(stage: &Machine, key: &str) -> f64 {
-    named(key).and_then(|row| row.part).map_or(1.0, |(_, arm)| arm.of(stage))
+    named(key).and_then(|row| row.part).map_or(1.0, |(_, arm)| arm.length(stage))
 }
 
 /// Rejects a machine with a number out of its range.

@@ -486,7 +486,7 @@ const BELT: &[Parameter] = &[
     row("belt.stiffness", "k₁ k₂ k₃", "N/m", Words("from `modulus`, `section` and `spans`"), POSITIVE, "132.76 kN/m",
         "Stiffness of each span: drive pulley to cart, cart to idler pulley, idler pulley to drive pulley. Three \
          values in a list.")
-        .at(Field::of(Of::Span, |s, span| stiffness(&s.belt, span), |s, span, value| s.belt.stiffness[span] = value))
+        .at(Field::new(Of::Span, |s, span| stiffness(&s.belt, span), |s, span, value| s.belt.stiffness[span] = value))
         .off("belt's stiffness").part(Sum::Stiffness, One),
     row("belt.modulus", "E", "Pa", Words("not used with `stiffness`"), POSITIVE, "8.335 GPa",
         "Modulus of elasticity, eq. (11); or a list of parts, each `{ share, modulus }`, for a composite.")
@@ -513,7 +513,7 @@ const BELT: &[Parameter] = &[
     row("belt.spans", "l₁ l₂ l₃", "m", Words("not used with `stiffness`"), POSITIVE, "0.34925 m", "Length of each span. Three values in a list.")
         .at(make!(Span, |_belt| true, |make, span| make.spans[span])),
     row("belt.damping", "c₁ c₂ c₃", "N s/m", Value(0.0), NOT_NEGATIVE, "0 N s/m", "Damping of each span, parallel to its stiffness. Three values in a list.")
-        .at(Field::of(Of::Span, |s, span| s.belt.damping.get(span).copied(), |s, span, value| s.belt.damping[span] = value))
+        .at(Field::new(Of::Span, |s, span| s.belt.damping.get(span).copied(), |s, span, value| s.belt.damping[span] = value))
         .off("belt's damping"),
     row("belt.damping_ratio", "ζ", "", Words("not used with `damping`"), Range { below: true, ..Range::new(0.0, 1.0) }, "0.02",
         "Damping ratio of the slowest elastic mode at x = 0; every span is damped in proportion to its stiffness, c = 2 ζ k / ω₀.")

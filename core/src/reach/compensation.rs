@@ -62,7 +62,7 @@ impl Compensation {
         Self {
             settings: *settings,
             machine: machine.clone(),
-            rigid: Rigid::of(machine),
+            rigid: Rigid::new(machine),
             before_belt: at != EncoderPlace::Cart,
             before_gear: at == EncoderPlace::Motor,
         }

@@ -124,7 +124,7 @@ struct Tension {
 
 impl Tension {
     /// Those of this belt; none if it is rigid, since the forces in its spans are unknown.
-    fn of(belt: &Belt) -> Vec<Self> {
+    fn from_belt(belt: &Belt) -> Vec<Self> {
         let slack = belt.pretension.map(|allowed| Self {
             limit: "slack",
             allowed,
@@ -165,7 +165,7 @@ pub fn loads_of_run(machine: &Machine, spans: &[[Peak; 2]]) -> Vec<Load> {
         let Tension { limit, allowed, .. } = tension;
         Load { limit, unit: "N", needed: tension.in_run(spans).0, allowed }
     };
-    Tension::of(&machine.belt).into_iter().map(load).collect()
+    Tension::from_belt(&machine.belt).into_iter().map(load).collect()
 }
 
 /// The limits of the belt that such a run along `profile` exceeds.
@@ -179,7 +179,7 @@ pub fn shortfalls_of_run(machine: &Machine, spans: &[[Peak; 2]], profile: &Profi
         };
         (needed > TAUT * allowed).then(|| at.beyond(limit, [needed, allowed], "N", words()))
     };
-    Tension::of(&machine.belt).into_iter().filter_map(exceeded).collect()
+    Tension::from_belt(&machine.belt).into_iter().filter_map(exceeded).collect()
 }
 
 /// Limits of this machine under a controller with these limits.
@@ -193,7 +193,7 @@ fn demands(machine: &Machine, bounds: Bounds) -> Vec<Demand> {
         needed: Box::new(|need| need.force.abs()),
         words: ["takes", " at the drive pulley", "; the teeth in mesh carry"],
     });
-    let of_belt = Tension::of(belt).into_iter().map(Tension::demand).chain(teeth);
+    let of_belt = Tension::from_belt(belt).into_iter().map(Tension::demand).chain(teeth);
     of_motor(machine, 0, bounds).into_iter().chain(of_belt).collect()
 }
 
@@ -205,7 +205,7 @@ fn of_motor(machine: &Machine, drive: usize, bounds: Bounds) -> Vec<Demand> {
 
 /// Demand on a stepper; none for other motors.
 fn pull_out(machine: &Machine, drive: usize) -> Option<Demand> {
-    let (curve, r) = (Curve::of(&machine.drives[drive])?, machine.pulley_radius);
+    let (curve, r) = (Curve::from_unit(&machine.drives[drive])?, machine.pulley_radius);
     Some(Demand {
         limit: "pull_out",
         unit: "N m",
@@ -273,7 +273,7 @@ fn of_drive(machine: &Machine, bounds: Bounds, drive: usize, profiles: &[Profile
 /// Requirements of one of several drives, with rigid belts.
 fn needs_of_drive(machine: &Machine, drive: usize, profiles: &[Profile], instants: usize) -> Vec<Need> {
     let all = FeedForward { model: FeedForwardModel::Rigid, ..FeedForward::NONE };
-    let Some(forward) = Forward::of(all, machine, drive) else { return Vec::new() };
+    let Some(forward) = Forward::new(all, machine, drive) else { return Vec::new() };
     let end = Profile::last_rest(profiles);
     let need = |k: usize| {
         let time = end * k as f64 / instants as f64;
@@ -344,7 +344,7 @@ fn exceeded(needs: &[Need], demand: &Demand) -> Option<Shortfall> {
 
 /// The voltage limit, if the largest speed alone exceeds it without acceleration.
 fn of_speed(machine: &Machine, volts: Option<f64>, needs: &[Need]) -> Option<Shortfall> {
-    let (volts, rigid) = (volts?, Rigid::of(machine));
+    let (volts, rigid) = (volts?, Rigid::new(machine));
     most(needs, volts, |need| need.voltage.abs())?;
     let steady = |speed: f64| {
         let (viscous, dry) = rigid.friction(speed, speed.signum());
@@ -387,7 +387,7 @@ fn of_slide(machine: &Machine, bounds: Bounds, number: usize, profile: &Profile)
 /// Breakaway force of a slide with everything that turns with it, if the motors give less at standstill.
 fn of_breakaway(machine: &Machine, bounds: Bounds, number: usize, instants: &[Instant]) -> Option<Shortfall> {
     let at_standstill = |drive: usize| {
-        if let Some(curve) = Curve::of(&machine.drives[drive]) {
+        if let Some(curve) = Curve::from_unit(&machine.drives[drive]) {
             return Some(curve.torque(0.0) / machine.pulley_radius);
         }
         let (volts, amperes) = limits_of(machine, drive, bounds);

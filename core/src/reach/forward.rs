@@ -65,7 +65,7 @@ struct Needed<N> {
 impl Forward {
     /// Feed-forward of `drive` with these factors on inertia and friction; none without feed-forward and compensated
     /// stretch, or for an axis, which has [`Compensation`](super::compensation::Compensation).
-    pub fn of(settings: FeedForward, machine: &Machine, drive: usize) -> Option<Self> {
+    pub fn new(settings: FeedForward, machine: &Machine, drive: usize) -> Option<Self> {
         if machine.drives.len() == 1 || settings.model == FeedForwardModel::None && !settings.compensate_stretch {
             return None;
         }
@@ -84,7 +84,7 @@ impl Forward {
             settings,
             pulley: Rigid::of_pulley(machine, drive),
             slides: slides.collect(),
-            belt: is_elastic.then(|| Belt::of(machine, drive)),
+            belt: is_elastic.then(|| Belt::new(machine, drive)),
             gear: machine.drives[drive].motor.gear_play.filter(|_| at_motor),
             radius: machine.pulley_radius,
         })
@@ -247,7 +247,7 @@ impl Slide {
 }
 
 impl Belt {
-    fn of(machine: &Machine, drive: usize) -> Self {
+    fn new(machine: &Machine, drive: usize) -> Self {
         let geometry = machine.geometry();
         let bodies = [0, 1].map(|slide: usize| geometry.slides[slide].body);
         let springs = machine.mechanism().springs.into_iter().take(geometry.spans.len());

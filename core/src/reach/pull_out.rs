@@ -68,7 +68,7 @@ const REMEMBERED: usize = 64;
 
 impl Curve {
     /// Curve of a motor with its driver; none unless it is a stepper.
-    pub fn of(unit: &DriveUnit) -> Option<Arc<Self>> {
+    pub fn from_unit(unit: &DriveUnit) -> Option<Arc<Self>> {
         let phases = Phases::of_motor(&unit.motor, &unit.amplifier)?;
         let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(curve) = known.iter().find(|curve| curve.phases == phases) {
@@ -126,9 +126,9 @@ pub struct PullOut {
 
 impl PullOut {
     /// The model of an axis with a stepper.
-    pub fn of(machine: &Machine) -> Option<Self> {
+    pub fn new(machine: &Machine) -> Option<Self> {
         let unit = &machine.drives[0];
-        Some(Self { phases: Phases::of_motor(&unit.motor, &unit.amplifier)?, rigid: Rigid::of(machine) })
+        Some(Self { phases: Phases::of_motor(&unit.motor, &unit.amplifier)?, rigid: Rigid::new(machine) })
     }
 
     /// Total moving mass at the belt, kg.

@@ -89,7 +89,7 @@ impl Share {
     pub const ALL: Self = Self { motor: 1.0, belt: 1.0 };
 
     /// That of the limit of this load.
-    fn of(&self, load: &Load) -> f64 {
+    fn value(&self, load: &Load) -> f64 {
         if load.is_of_motor() { self.motor } else { self.belt }
     }
 }
@@ -111,7 +111,7 @@ const ANY: Limits = Limits { speed: 1.0, acceleration: 1.0, jerk: None, snap: No
 
 impl MovePath {
     /// Legs of references on one clock; none if the references do not move.
-    pub fn of(profiles: &[Profile]) -> Option<Self> {
+    pub fn new(profiles: &[Profile]) -> Option<Self> {
         let mut rested = 0.0;
         let (mut legs, mut lengths) = (Vec::new(), Vec::new());
         for number in 0..profiles.first()?.passages().len() {
@@ -222,9 +222,9 @@ impl Quickest<'_> {
             // On the finer grid of instants, the axis needs slightly more than during the search.
             let closely = loads(self.machine, self.design.bounds(), &profiles, CLOSELY);
             let others = others(&profiles);
-            let own = closely.iter().map(|load| (load, wanted.of(load)));
+            let own = closely.iter().map(|load| (load, wanted.value(load)));
             let mut most = Share { motor: 0.0, belt: 0.0 };
-            for (load, allowed) in own.chain(others.iter().map(|load| (load, Share::ALL.of(load)))) {
+            for (load, allowed) in own.chain(others.iter().map(|load| (load, Share::ALL.value(load)))) {
                 let most = if load.is_of_motor() { &mut most.motor } else { &mut most.belt };
                 *most = most.max(load.share() / allowed);
             }
@@ -308,6 +308,6 @@ impl Quickest<'_> {
     fn is_within(&self, way: &MovePath, limits: &Limits, share: Share) -> bool {
         let Ok(profiles) = way.within(limits) else { return false };
         let loads = loads(self.machine, self.design.bounds(), &self.design.shaped(&profiles), INSTANTS);
-        loads.iter().all(|load| load.share() <= share.of(load))
+        loads.iter().all(|load| load.share() <= share.value(load))
     }
 }

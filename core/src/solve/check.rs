@@ -279,7 +279,7 @@ fn times(until: f64, every: f64) -> Result<()> {
 /// Rejects a run without rows or with an invalid initial state.
 pub(super) fn experiment(mechanism: &Mechanism, experiment: &Experiment) -> Result<()> {
     state(&experiment.initial)?;
-    let begun = Course::of(mechanism, experiment);
+    let begun = Course::new(mechanism, experiment);
     course(mechanism, &begun)?;
     commands(mechanism, &begun)?;
     // Joined bodies start with equal speed and position.

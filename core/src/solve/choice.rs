@@ -33,11 +33,13 @@ impl Choice {
     /// the command line; Table 3 is for an axis only.
     pub fn solver(&self, machine: &Machine) -> Result<Solver> {
         let option = match (self.solver, self.step, self.method) {
-            _ if machine.kind == crate::machine::MachineKind::Axis => return self.instead_of(Solver::of(machine)),
+            _ if machine.kind == crate::machine::MachineKind::Axis => {
+                return self.instead_of(Solver::for_machine(machine));
+            }
             (Some(SolverKind::Table3), _, _) => "--solver table3",
             (_, Some(_), _) => "--step",
             (_, _, Some(_)) => "--method",
-            _ => return self.instead_of(Solver::of(machine)),
+            _ => return self.instead_of(Solver::for_machine(machine)),
         };
         Err(Error::new("the paper's Table 3, with its fixed step, is of a single axis")
             .in_file(option)

@@ -24,7 +24,7 @@ struct Level {
 
 impl Level {
     /// Derivative of a form, whose constant has none.
-    fn of(&self, form: &Form) -> f64 {
+    fn value(&self, form: &Form) -> f64 {
         let form = if self.order == 0 { *form } else { Form { constant: 0.0, ..*form } };
         form.value_at(&self.stretch, &self.state, &self.input)
     }
@@ -53,13 +53,13 @@ impl Simulator {
             *into = match heading.shown {
                 Shown::Time => f64::from(u8::from(order == 1)),
                 Shown::Input(drive) => level.input[drive],
-                Shown::Voltage(drive) => level.of(&mechanism.voltage(drive, mode)),
-                Shown::Current(drive) => level.of(&mechanism.current(drive, mode)),
+                Shown::Voltage(drive) => level.value(&mechanism.voltage(drive, mode)),
+                Shown::Current(drive) => level.value(&mechanism.current(drive, mode)),
                 Shown::SecondPhase(drive) => level.state.current[mechanism.first_current(drive) + 1],
                 Shown::Position(body, factor) => before.state.speed[body] * factor,
                 Shown::Speed(body, factor) => level.state.speed[body] * factor,
                 Shown::Stretch(spring) => level.stretch[spring],
-                Shown::Force(spring, factor) => level.of(&mechanism.spring_force(spring, mode)) * factor,
+                Shown::Force(spring, factor) => level.value(&mechanism.spring_force(spring, mode)) * factor,
                 Shown::Friction(body) => self.friction_rate(body, &now, &level),
                 // They are constant between events; a linear machine has no bristles.
                 Shown::Motion(_) | Shown::Contact(_) | Shown::Counts(..) | Shown::Bristle(_) => 0.0,
@@ -86,10 +86,10 @@ impl Simulator {
             *stretch = spring.arms.iter().map(|&(body, arm)| arm * level.state.speed[body]).sum();
         }
         for (body, speed) in next.state.speed.iter_mut().enumerate().take(mechanism.bodies.len()) {
-            *speed = level.of(&equations.acceleration[body]);
+            *speed = level.value(&equations.acceleration[body]);
         }
         for (drive, current) in next.state.current.iter_mut().enumerate().take(mechanism.drives.len()) {
-            *current = level.of(&equations.current_rate[drive]);
+            *current = level.value(&equations.current_rate[drive]);
         }
         // u⁽ⁿ⁾ = n! c_n, powers counted from now
         let factorial: f64 = (1..=order).map(|k| k as f64).product();
@@ -112,7 +112,7 @@ impl Simulator {
                 let ways = [(true, true), (true, false), (false, true), (false, false)];
                 let loads = ways.map(|(positive, forward)| {
                     let form = mechanism.load(body, forward, &mode.with_torque(positive));
-                    (now.of(&form), level.of(&form))
+                    (now.value(&form), level.value(&form))
                 });
                 let least = loads.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0));
                 let most = loads.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0));

@@ -108,7 +108,7 @@ impl ErrorEstimate {
     /// For a run of this experiment on this machine.
     pub fn new(machine: &Machine, experiment: &Experiment) -> Self {
         let mechanism = machine.mechanism();
-        Self::of_mechanism(&mechanism, &Course::of(&mechanism, experiment))
+        Self::of_mechanism(&mechanism, &Course::new(&mechanism, experiment))
     }
 
     /// For a run of any mechanism: positions of all bodies except rotors.
@@ -149,7 +149,7 @@ impl ErrorEstimate {
         flow: &mut dyn FnMut() -> Flow,
     ) -> Result<Option<PositionError>> {
         let mechanism = machine.mechanism();
-        let course = Course::of(&mechanism, experiment);
+        let course = Course::new(&mechanism, experiment);
         self.finish_mechanism(&mechanism, &course, tolerance, outcome, flow)
     }
 
@@ -187,7 +187,7 @@ impl ErrorEstimate {
         let tolerance = if let Solver::General { tolerance } = first { tolerance } else { 0.0 };
         self.compare((outcome, tolerance), flow, &mut |sink| {
             let output = Output { detail: Detail::Lean, sink, observer: None };
-            Ok(drive(Run::of(&mechanism, &start, (second, degree), Known::default(), output)?))
+            Ok(drive(Run::from_mechanism(&mechanism, &start, (second, degree), Known::default(), output)?))
         })
     }
 

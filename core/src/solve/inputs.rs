@@ -6,7 +6,7 @@ use crate::signal::{DEGREE, Piece, Signal, shifted};
 
 /// Inputs of all drives at `time` (s) as they apply them: rounded to microsteps for a stepper.
 pub(crate) fn applied(signals: &[Signal], mechanism: &Mechanism, time: f64) -> [f64; DRIVES] {
-    Pieces::of(signals, time).applied(mechanism, time).values(0.0, 0)
+    Pieces::new(signals, time).applied(mechanism, time).values(0.0, 0)
 }
 
 /// One polynomial for each input, from `start` to `end`; missing inputs are zero.
@@ -22,7 +22,7 @@ pub(super) struct Pieces {
 
 impl Pieces {
     /// Values and derivatives of these signals at `time`, s.
-    pub fn of(signals: &[Signal], time: f64) -> Self {
+    pub fn new(signals: &[Signal], time: f64) -> Self {
         let mut pieces = Self { start: time, end: f64::INFINITY, coefficients: [[0.0; DEGREE + 1]; DRIVES] };
         for (signal, coefficients) in signals.iter().zip(&mut pieces.coefficients) {
             let piece = signal.piece(time);

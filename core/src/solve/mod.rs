@@ -78,7 +78,7 @@ impl Solver {
     pub const GENERAL: Self = Self::General { tolerance: 1e-9 };
 
     /// The solver for this machine: the exact one if possible.
-    pub fn of(machine: &Machine) -> Self {
+    pub fn for_machine(machine: &Machine) -> Self {
         if machine.is_piecewise_linear() { Self::Exact } else { Self::GENERAL }
     }
 
@@ -384,7 +384,7 @@ impl Bench {
         let Some((machine, mechanism)) = &self.mounted else { return Err(nothing_mounted()) };
         check::experiment(mechanism, experiment)?;
         let known = std::mem::take(&mut self.known);
-        let (outcome, known) = go(mechanism, experiment, Solver::of(machine), known, output)?;
+        let (outcome, known) = go(mechanism, experiment, Solver::for_machine(machine), known, output)?;
         self.known = known;
         Ok(outcome)
     }
@@ -538,7 +538,7 @@ fn go(
     // Smooth inputs have their derivatives in the state.
     let degree = experiment.inputs.iter().map(|input| input.degree()).max().unwrap_or(0);
     let start = experiment.start(mechanism);
-    let run = Run::of(mechanism, &start, (solver, degree), known, output)?;
+    let run = Run::from_mechanism(mechanism, &start, (solver, degree), known, output)?;
     Ok(run.along(&experiment.inputs))
 }
 

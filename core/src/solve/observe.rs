@@ -270,7 +270,7 @@ pub struct Curve {
 impl Curve {
     /// The polynomial of one quantity.
     #[inline]
-    pub fn of(&self, q: usize) -> Polynomial {
+    pub fn polynomial(&self, q: usize) -> Polynomial {
         // Not by `map`, which would copy all readings.
         Polynomial(std::array::from_fn(|k| self.terms[k][q]))
     }

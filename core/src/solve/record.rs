@@ -122,7 +122,7 @@ impl<'a> Recorder<'a> {
     pub(crate) fn segment(&mut self, taken: u64, coordinates: &Coordinates, mode: &Mode) {
         if self.detail != Detail::None && self.taken != Some(taken) {
             self.taken = Some(taken);
-            let sheet = self.sheets.of(&self.mechanism, &self.columns.places, mode);
+            let sheet = self.sheets.index(&self.mechanism, &self.columns.places, mode);
             self.segments.push(Segment { start: self.count, sheet, coordinates: coordinates.clone() });
         }
     }

@@ -275,7 +275,7 @@ fn move_on<B: Between>(solver: &mut B, fallen: &Transition, body: usize, to: Opt
         }
     }
     if let Some(what) = fallen.told {
-        let (part, from, to) = (Part::of(&mechanism, what), Status::Motion(from), Status::Motion(to));
+        let (part, from, to) = (Part::new(&mechanism, what), Status::Motion(from), Status::Motion(to));
         Event { time, part, from, to, load: load.value, by_rounding }.note(&mut rules.events);
     }
     solver.take_up_mode();
@@ -306,7 +306,7 @@ fn switch<B: Between>(solver: &mut B, fallen: &Transition, next: Next) {
     let from = fallen.told.map(|what| rules.mode.status(what));
     mechanism.put_next(&mut rules.mode, next);
     if let (Some(what), Some(from)) = (fallen.told, from) {
-        let (part, to) = (Part::of(&mechanism, what), rules.mode.status(what));
+        let (part, to) = (Part::new(&mechanism, what), rules.mode.status(what));
         Event { time, part, from, to, load: 0.0, by_rounding: false }.note(&mut rules.events);
     }
     solver.take_up_mode();
@@ -364,7 +364,7 @@ fn start_gears<B: Between>(solver: &mut B) {
 
 /// Records that rounding decides the motion of a body.
 pub(super) fn note_tie<B: Between>(solver: &mut B, body: usize) {
-    let tie = Tie { time: solver.time(), part: Part::of(solver.mechanism(), What::Body(body)) };
+    let tie = Tie { time: solver.time(), part: Part::new(solver.mechanism(), What::Body(body)) };
     let rules = solver.rules_mut();
     tie.note(&mut rules.ties, &rules.events);
 }

@@ -29,7 +29,7 @@ pub struct Course {
 
 impl Course {
     /// The course of this mechanism in an experiment.
-    pub fn of(mechanism: &Mechanism, experiment: &Experiment) -> Self {
+    pub fn new(mechanism: &Mechanism, experiment: &Experiment) -> Self {
         let &Experiment { ref inputs, until, every, ref initial, .. } = experiment;
         Self { inputs: inputs.clone(), start: mechanism.begun(initial), until, every }
     }
@@ -114,11 +114,11 @@ impl<'a> Run<'a> {
         let mechanism = Arc::new(mechanism);
         check::experiment(&mechanism, experiment)?;
         let start = experiment.start(&mechanism);
-        Self::of(&mechanism, &start, (solver, 0), Known::default(), Output { detail, sink, observer })
+        Self::from_mechanism(&mechanism, &start, (solver, 0), Known::default(), Output { detail, sink, observer })
     }
 
     /// Run of a checked mechanism, with inputs of at most this degree.
-    pub(super) fn of(
+    pub(super) fn from_mechanism(
         mechanism: &Arc<Mechanism>,
         start: &Start,
         (solver, degree): (Solver, usize),
@@ -157,7 +157,7 @@ impl<'a> Run<'a> {
         let start = Start { state: course.start, until: course.until, every: course.every, noise: 0.0 };
         let degree = course.inputs.iter().map(Signal::degree).max().unwrap_or(0);
         let output = Output { detail, sink, observer };
-        Self::of(&Arc::new(mechanism.clone()), &start, (solver, degree), Known::default(), output)
+        Self::from_mechanism(&Arc::new(mechanism.clone()), &start, (solver, degree), Known::default(), output)
     }
 
     /// Holds these inputs, one for each drive, from now until `until`, s, or to the end of the run; false if the run

@@ -29,7 +29,7 @@ pub(super) trait Running {
 
     /// Sets the pieces of these signals from the present `time` on, and returns their end.
     fn set_signals(&mut self, signals: &[Signal], time: f64) -> f64 {
-        let pieces = self.told(Pieces::of(signals, time));
+        let pieces = self.told(Pieces::new(signals, time));
         self.set_input(&pieces);
         pieces.end
     }

@@ -52,7 +52,7 @@ impl Bench {
     ) -> Result<Option<Sensitivities>> {
         let Some((stage, mechanism)) = &self.mounted else { return Err(super::nothing_mounted()) };
         check::experiment(mechanism, experiment)?;
-        if Solver::of(stage) != Solver::Exact {
+        if Solver::for_machine(stage) != Solver::Exact {
             return Ok(None);
         }
         let task = Task { mechanism, experiment, variables, outputs };

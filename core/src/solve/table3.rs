@@ -46,7 +46,7 @@ pub(crate) fn run(
     let coordinates = Coordinates::new(&layout, &State::default()).0;
     let mut recorder =
         Recorder::new(mechanism, &layout, (STATE, &|drive| layout.states + drive), grid, output.within());
-    let readout = Readout::new(mechanism, &Mode::of([]));
+    let readout = Readout::new(mechanism, &Mode::new([]));
     let mut cost = Cost { modes: 1, ..Cost::default() };
     let mut ending = Ending::Complete;
     for row in 0..=grid.intervals() {
@@ -59,14 +59,14 @@ pub(crate) fn run(
         let input = experiment.inputs[0].value(time);
         let motion = model.motion(&state, input);
         // A row shows the state itself, with its own angles.
-        recorder.segment(row, &coordinates.at(&state), &Mode::of(motion));
+        recorder.segment(row, &coordinates.at(&state), &Mode::new(motion));
         recorder.push_state(&inner_of(&layout, mechanism, &state), &[input, 0.0, 0.0], None);
         if recorder.flow == Flow::Stop {
             ending = Ending::Interrupted { time };
             break;
         }
         // Only its steps are known, and a jump of the input acts from the next one on.
-        let mode = Mode::of(motion);
+        let mode = Mode::new(motion);
         let mut show = |begin: f64, length: f64, from: &Reading, to: &Reading| {
             if let Some(observer) = &mut recorder.observer {
                 observer.pass(&Gap { begin, length, from, to, bow: &[0.0; QUANTITIES], mode: &mode, few: readout.few });
@@ -104,7 +104,7 @@ pub(crate) fn run(
         _ => grid.end(),
     };
     if let Some(observer) = &mut recorder.observer {
-        observer.end(time, &state, &Mode::of(model.motion(&state, experiment.inputs[0].value(time))));
+        observer.end(time, &state, &Mode::new(model.motion(&state, experiment.inputs[0].value(time))));
     }
     recorder.finish();
     cost.samples = recorder.rows;
@@ -164,7 +164,7 @@ impl<'a> Model<'a> {
         if let Some(part) = machine.beyond_the_paper() {
             return Err(unfit(format!("the paper's Table 3 does not support {part}")));
         }
-        let free = Mode::of([]);
+        let free = Mode::new([]);
         let equations = mechanism.equations(free);
         Ok(Self {
             mechanism,

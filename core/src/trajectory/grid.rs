@@ -27,7 +27,7 @@ const NEAR: f64 = 1e-6;
 impl Grid {
     /// Rows from zero to `until` at the interval `every`; both in s and positive.
     pub fn new(every: f64, until: f64) -> Self {
-        let interval = Interval::of(every);
+        let interval = Interval::new(every);
         let ratio = until / every;
         let nearest = ratio.round();
         let whole = (ratio - nearest).abs() <= NEAR && nearest >= 1.0;
@@ -112,7 +112,7 @@ const LARGEST: f64 = 1e6;
 
 impl Interval {
     /// The interval of this length, s.
-    pub fn of(length: f64) -> Self {
+    pub fn new(length: f64) -> Self {
         let (over, under) = decimal(length).or_else(|| fraction(length)).unwrap_or((length, 1.0));
         let exact = if over.fract() == 0.0 { (WHOLE / over) as u64 } else { 0 };
         Self { length, over, under, exact, rest: length.mul_add(-under, over) / under }

@@ -239,7 +239,7 @@ impl Model {
     /// Lead of the feed-forward inside, s, if it evaluates the reference ahead of time.
     pub fn lead(&self) -> Option<f64> {
         let design = self.design.as_ref().filter(|design| design.feed_forward.model != FeedForwardModel::None)?;
-        Some(Loop::of(design).lead).filter(|lead| *lead > 0.0)
+        Some(Loop::new(design).lead).filter(|lead| *lead > 0.0)
     }
 
     /// The prefix of the variables of each slide, none for an axis, and its name.

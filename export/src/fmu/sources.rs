@@ -72,12 +72,12 @@ struct Entry {
 }
 
 impl Entry {
-    fn of(what: &'static str, index: usize) -> Self {
+    fn new(what: &'static str, index: usize) -> Self {
         Self { what, index, table: "0U".into(), factor: 1.0, limit: 0.0 }
     }
 
     fn row(table: String) -> Self {
-        Self { table, ..Self::of("IS_ROW", 0) }
+        Self { table, ..Self::new("IS_ROW", 0) }
     }
 }
 
@@ -178,25 +178,25 @@ impl<'m> Writer<'m> {
     fn entry(&mut self, variable: &Variable, tables: &mut Tables) -> Result<Entry> {
         let quantity = |index: usize| self.model.quantities[index].0;
         Ok(match variable.role {
-            Role::Time => Entry::of("IS_TIME", 0),
-            Role::Input(drive) => Entry::of("IS_INPUT", drive),
-            Role::Force(load) => Entry::of("IS_INPUT", self.model.drives() + load),
-            Role::Parameter(..) => Entry::of("IS_FIXED", 0),
+            Role::Time => Entry::new("IS_TIME", 0),
+            Role::Input(drive) => Entry::new("IS_INPUT", drive),
+            Role::Force(load) => Entry::new("IS_INPUT", self.model.drives() + load),
+            Role::Parameter(..) => Entry::new("IS_FIXED", 0),
             Role::Output(column) => self.column(self.mechanism.columns[column].shown, tables)?,
             Role::Quantity(index) => match quantity(index) {
-                Quantity::Position(body) => Entry::of("IS_POSITION", body),
-                Quantity::Speed(body) => Entry::of("IS_SPEED", body),
-                Quantity::Current(drive) => Entry::of("IS_STATE", self.current[drive].unwrap_or(0)),
+                Quantity::Position(body) => Entry::new("IS_POSITION", body),
+                Quantity::Speed(body) => Entry::new("IS_SPEED", body),
+                Quantity::Current(drive) => Entry::new("IS_STATE", self.current[drive].unwrap_or(0)),
                 Quantity::Bristle(_) => return Err(curved(variable)),
             },
             // Tables of rates stand by the places of states.
             Role::Rate(index) => match quantity(index) {
-                Quantity::Position(body) => Entry::of("IS_SPEED", body),
+                Quantity::Position(body) => Entry::new("IS_SPEED", body),
                 Quantity::Speed(body) => Entry::row(format!("{}U", self.speed[body])),
                 Quantity::Current(drive) => Entry::row(format!("{}U", self.current[drive].unwrap_or(0))),
                 Quantity::Bristle(_) => return Err(curved(variable)),
             },
-            Role::Condition(_) => Entry::of("IS_HIDDEN", 0),
+            Role::Condition(_) => Entry::new("IS_HIDDEN", 0),
             Role::Reference(_) | Role::Ahead(_) | Role::Error(_) | Role::Command(_) => return Err(curved(variable)),
         })
     }
@@ -204,8 +204,8 @@ impl<'m> Writer<'m> {
     fn column(&mut self, shown: Shown, tables: &mut Tables) -> Result<Entry> {
         let amplifier = |drive: usize| &self.mechanism.drives[drive].amplifier;
         Ok(match shown {
-            Shown::Time => Entry::of("IS_TIME", 0),
-            Shown::Input(drive) => Entry::of("IS_TAKEN", drive),
+            Shown::Time => Entry::new("IS_TIME", 0),
+            Shown::Input(drive) => Entry::new("IS_TAKEN", drive),
             Shown::Voltage(drive) => {
                 let limit = amplifier(drive).voltage_limit.unwrap_or(0.0);
                 Entry { limit, ..Entry::row(format!("VOLTAGE_TABLE + {drive}U")) }
@@ -214,17 +214,17 @@ impl<'m> Writer<'m> {
                 let limit = amplifier(drive).current_limit.unwrap_or(0.0);
                 Entry { limit, ..Entry::row(format!("CURRENT_TABLE + {drive}U")) }
             }
-            Shown::Position(body, factor) => Entry { factor, ..Entry::of("IS_POSITION", body) },
-            Shown::Speed(body, factor) => Entry { factor, ..Entry::of("IS_SPEED", body) },
+            Shown::Position(body, factor) => Entry { factor, ..Entry::new("IS_POSITION", body) },
+            Shown::Speed(body, factor) => Entry { factor, ..Entry::new("IS_SPEED", body) },
             Shown::Stretch(spring) => {
                 let row = tables.ask(&|_, _| Form::stretch(spring))?;
                 Entry::row(format!("OTHER_TABLE + {row}U"))
             }
             Shown::Force(spring, factor) => Entry { factor, ..Entry::row(format!("FORCE_TABLE + {spring}U")) },
-            Shown::Friction(body) => Entry::of("IS_FRICTION", self.friction(body, tables)?),
-            Shown::Motion(body) => Entry::of("IS_MOTION", body),
-            Shown::Contact(spring) => Entry::of("IS_CONTACT", self.contact(spring, tables)),
-            Shown::Counts(body, factor) => Entry { factor, ..Entry::of("IS_COUNTS", body) },
+            Shown::Friction(body) => Entry::new("IS_FRICTION", self.friction(body, tables)?),
+            Shown::Motion(body) => Entry::new("IS_MOTION", body),
+            Shown::Contact(spring) => Entry::new("IS_CONTACT", self.contact(spring, tables)),
+            Shown::Counts(body, factor) => Entry { factor, ..Entry::new("IS_COUNTS", body) },
             Shown::SecondPhase(_) => return Err(Error::new("a stepper is not linear between events")),
             Shown::Bristle(_) => return Err(Error::new("bristles are not linear between events")),
         })

@@ -82,7 +82,7 @@ fn variables(case: &Case, tables: &Tables, step: f64) -> Result<Vec<(&'static st
         ("lengths", Variable::Numbers(packed.lengths.iter().map(|row| row.to_vec()).collect())),
         ("outputs_first", whole(&packed.outputs)),
     ];
-    let system = System::of(&case.machine, Operation::default())?;
+    let system = System::new(&case.machine, Operation::default())?;
     let matrix =
         |m: &nalgebra::DMatrix<f64>| Variable::Numbers(m.row_iter().map(|row| row.iter().copied().collect()).collect());
     all.extend([

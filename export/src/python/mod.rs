@@ -76,7 +76,7 @@ fn lists(tables: &Tables, packed: &Packed) -> String {
 }
 
 fn linear(machine: &Machine) -> Result<String> {
-    let system = System::of(machine, Operation::default())?;
+    let system = System::new(machine, Operation::default())?;
     let rows = |m: &nalgebra::DMatrix<f64>| -> Vec<Vec<f64>> {
         m.row_iter().map(|row| row.iter().copied().collect()).collect()
     };

@@ -56,7 +56,7 @@ struct Places {
 impl Tables {
     /// Tables of a mechanism whose drives may be steppers. Errors: one that is otherwise not piecewise linear.
     pub fn with_steppers(mechanism: &Mechanism) -> Result<Self> {
-        let phases: Option<Vec<Phases>> = mechanism.drives.iter().map(Phases::of).collect();
+        let phases: Option<Vec<Phases>> = mechanism.drives.iter().map(Phases::new).collect();
         match phases {
             None => Self::new(mechanism),
             Some(phases) => Ok(Self::new(&by_torque(mechanism))?.with_phases(mechanism, &phases)),

@@ -11,7 +11,7 @@ pub fn figure(case: &Case, found: &Designed) -> Result<Figure> {
     const COLOURS: [Colour; 3] = [Colour::Amber, Colour::Blue, Colour::Green];
     let geometry = case.machine.geometry();
     let experiment = found.experiment();
-    let run = simulate(&case.machine, &experiment, Solver::of(&case.machine))?.trajectory;
+    let run = simulate(&case.machine, &experiment, Solver::for_machine(&case.machine))?.trajectory;
     let column = |name: &str| run.get(name).unwrap_or_default().to_vec();
     let time = column("time");
     let line = |name: &str, values: Vec<f64>, colour| {

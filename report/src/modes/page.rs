@@ -18,7 +18,7 @@ pub fn page(analysis: &Analysis, pictures: &Pictures) -> Page {
     drawn(&mut page, &analysis.case.machine);
     page.section("Poles");
     let mut rows = Table::new("").column("Where", "").column("What", "");
-    for root in Root::of(&analysis.poles) {
+    for root in Root::from_values(&analysis.poles) {
         let (value, more) = pole(root);
         rows.row([Cell::from(printed(&value)), Cell::from(printed(&more))]);
     }

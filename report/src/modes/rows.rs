@@ -85,7 +85,7 @@ pub fn zeros(transfer: &Transfer) -> String {
             )
         }
     };
-    Root::of(&transfer.zeros.values).into_iter().map(one).collect::<Vec<_>>().join(", ")
+    Root::from_values(&transfer.zeros.values).into_iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 /// A point of the z plane; of a pair both.

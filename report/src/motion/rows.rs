@@ -114,7 +114,7 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
     }
     if let Structure::SlidingMode(gains) = &tried.design.structure {
         let (speed, acceleration) = peaks(done);
-        let needed = sliding::required(gains, &Rigid::of(machine), 0.2, speed, acceleration);
+        let needed = sliding::required(gains, &Rigid::new(machine), 0.2, speed, acceleration);
         let verdict = if gains.reaching > needed { "holds" } else { "does not hold" };
         lines.push((
             "reaching",

@@ -97,9 +97,9 @@ fn experiment(
 fn all_figures(page: &mut Page, run: &SimulatedExperiment, machine: &Machine) {
     page.subsection("Key figures");
     let mut table = Table::new("").column("Figure", "").column("Value", "").column("At", "s");
-    for figure in metrics::figures(machine.kind, metrics::Extras::of(machine)) {
+    for figure in metrics::figures(machine.kind, metrics::Extras::new(machine)) {
         let unit = figure.unit;
-        let (value, at) = match figure.of(&run.metrics) {
+        let (value, at) = match figure.value(&run.metrics) {
             Worth::TimeOfPeak(_) => continue,
             Worth::Number(value) if value.is_nan() => (Cell::from("none"), Cell::from("")),
             Worth::Number(value) => (Cell::Number(number::engineering(value, unit, 6)), Cell::from("")),

@@ -265,8 +265,8 @@ fn moved(work: &Work, motion: &Move) -> Result<Figure> {
         let voltages = drives.map(|(at, style)| (String::new(), format!("{}voltage", at.prefix), style));
         let kept = |(name, column, style)| (name, column, style, decimator());
         let (mut x, mut u): (Vec<_>, Vec<_>) = (errors.map(kept).collect(), voltages.map(kept).collect());
-        let timing = Loop::of(design);
-        let (controllers, solver) = (&mut each(&mut controllers), Solver::of(stage));
+        let timing = Loop::new(design);
+        let (controllers, solver) = (&mut each(&mut controllers), Solver::for_machine(stage));
         stream(stage, controllers, &timing, &profiles, &rows, solver, false, &mut |block| {
             let column = |name: &str| block.get(name).unwrap_or(&[]);
             x.iter_mut().chain(&mut u).for_each(|(_, name, _, kept)| kept.push(column("time"), column(name)));

@@ -61,7 +61,7 @@ const KINDS: [(&str, &[&str]); 8] = [
 ];
 
 /// The share of each kind of work, and of the rest, in a profile.
-pub fn of(profile: &str) -> Vec<(&'static str, f64)> {
+pub fn shares(profile: &str) -> Vec<(&'static str, f64)> {
     let mut costs = [0_u64; KINDS.len() + 1];
     for (name, cost) in by_function(profile) {
         let kind = KINDS.iter().position(|(_, parts)| parts.iter().any(|part| name.contains(part)));
@@ -109,7 +109,7 @@ mod tests {
     fn a_call_counts_for_who_is_called_alone() {
         let profile = "events: Ir\n\nfn=(1) taut::solve::roots::first_fall\n3 40\n+2 20\ncfn=(2) _int_malloc\ncalls=3 0\n* 30\n\
                        fn=(2)\n0 30\nfn=(3) main\n9 10\n";
-        let shares = of(profile);
+        let shares = shares(profile);
         let share = |part: &str| shares.iter().find(|(name, _)| name.starts_with(part)).map(|(_, share)| *share);
         assert_eq!(share("event search"), Some(0.6));
         assert_eq!(share("memory"), Some(0.3));

@@ -327,7 +327,7 @@ impl Channel {
                 continue;
             }
             let sides = [&values[start.saturating_sub(near)..start], &values[first..(first + near).min(values.len())]];
-            let sides: Vec<Side> = sides.into_iter().filter(|side| side.len() >= NEAR[0]).map(Side::of).collect();
+            let sides: Vec<Side> = sides.into_iter().filter(|side| side.len() >= NEAR[0]).map(Side::new).collect();
             let sigma = sides.iter().map(|side| side.noise).fold(f64::INFINITY, f64::min);
             if sides.is_empty() || sigma <= DITHERS * resolution || !sides.iter().all(Side::alternates) {
                 continue;
@@ -673,7 +673,7 @@ struct Side {
 }
 
 impl Side {
-    fn of(values: &[f64]) -> Self {
+    fn new(values: &[f64]) -> Self {
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let (early, late) = values.split_at(values.len() / 2);
         let bends: Vec<f64> = values.windows(3).map(|y| y[0] - 2.0 * y[1] + y[2]).collect();

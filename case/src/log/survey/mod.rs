@@ -100,7 +100,7 @@ impl Survey {
         for output in &log.outputs {
             channels.push(Channel::new(output.quantity.name(), output.quantity.unit(), &output.values, &log.time));
         }
-        let motion = Motion::of(log, &channels, &timing);
+        let motion = Motion::new(log, &channels, &timing);
         let mut notes = timing.notes();
         notes.extend(log.ended.as_ref().map(|words| {
             let text = format!("the recorder ended the file with `{words}`: what came after it is missing");

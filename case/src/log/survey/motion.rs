@@ -87,7 +87,7 @@ pub struct Steady {
 impl Motion {
     /// By the first position there is, or else by the first speed; of a machine with several coordinates by the first
     /// that moves.
-    pub(super) fn of(log: &Log, channels: &[Channel], timing: &Timing) -> Option<Self> {
+    pub(super) fn new(log: &Log, channels: &[Channel], timing: &Timing) -> Option<Self> {
         let column = |quantity: &Quantity| {
             let output = log.output(*quantity)?;
             Some((output, channels.iter().find(|channel| channel.name == output.quantity.name())?))

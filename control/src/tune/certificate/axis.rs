@@ -86,7 +86,7 @@ impl Sampler<'_> {
     /// Coefficients of d and of each n, and their magnitudes.
     fn of(&self, corner: &Corner) -> Result<Vec<[Vec<f64>; 2]>> {
         let machine = self.family.machine_at(corner);
-        let system = StateSpace::of(&machine, corner.operation())?;
+        let system = StateSpace::new(&machine, corner.operation())?;
         let weight = System::denominator(&machine, corner.operation()) / self.weight;
         let scaled = |roots: &[Complex<f64>]| roots.iter().map(|root| root / self.unit).collect::<Vec<_>>();
         let poles = system.poles()?;

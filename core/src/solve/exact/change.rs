@@ -109,7 +109,7 @@ impl<const N: usize> Between for Core<N> {
         self.common.rounding.swing(self.matrices.swing, Core::time(self));
         let (mechanism, space) = (&self.common.mechanism, &self.common.space);
         let (matrices, is_new) =
-            ModeMatrices::of(&mut self.known, mechanism, space, &self.common.rules.mode, self.common.h);
+            ModeMatrices::from_known(&mut self.known, mechanism, space, &self.common.rules.mode, self.common.h);
         self.matrices = matrices;
         self.common.taken += 1;
         let inner = self.inner();

@@ -242,7 +242,7 @@ pub(in crate::solve) struct ModeMatrices<const N: usize> {
 
 impl<const N: usize> ModeMatrices<N> {
     /// The matrices of a mode and an interval: known ones, or new ones, which are added; true if they are new.
-    pub(super) fn of(
+    pub(super) fn from_known(
         known: &mut Vec<Arc<Self>>,
         mechanism: &Mechanism,
         space: &Space,

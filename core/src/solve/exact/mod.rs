@@ -133,7 +133,7 @@ impl<const N: usize> Core<N> {
         let mode = mechanism.first_mode(start);
         coordinates.hold(layout, &mode, &inner);
         let shared = propagators(&known);
-        let (matrices, is_new) = ModeMatrices::of(&mut known, &mechanism, &space, &mode, h);
+        let (matrices, is_new) = ModeMatrices::from_known(&mut known, &mechanism, &space, &mode, h);
         let rounding = Rounding::new(&space.layout, &mechanism);
         let common = Common {
             mechanism,
@@ -549,7 +549,7 @@ impl<const M: usize> Make for Smoothed<M> {
         z[N - 1] = 1.0;
         let mut known = Vec::new();
         let (matrices, _) =
-            ModeMatrices::of(&mut known, &common.mechanism, &common.space, &common.rules.mode, common.h);
+            ModeMatrices::from_known(&mut known, &common.mechanism, &common.space, &common.rules.mode, common.h);
         let room = Box::new(GuardBuffers::new());
         let errors = errors.map(|errors| Box::new(errors.resized()));
         Box::new(Core::<N> { z, largest: [0.0; N], matrices, known, shared: 0, room, errors, common })

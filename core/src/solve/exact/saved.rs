@@ -33,7 +33,7 @@ impl<const N: usize> Core<N> {
             return None;
         }
         let (mechanism, space) = (&common.mechanism, &common.space);
-        self.matrices = ModeMatrices::of(&mut self.known, mechanism, space, &common.rules.mode, common.h).0;
+        self.matrices = ModeMatrices::from_known(&mut self.known, mechanism, space, &common.rules.mode, common.h).0;
         Some(())
     }
 

@@ -48,7 +48,7 @@ pub(super) struct Calm {
 
 impl Calm {
     /// None if something moves that no bristles hold, or that nothing damps.
-    pub(super) fn of(
+    pub(super) fn new(
         (model, mode): (&Model, &Mode),
         sources: &[Source],
         equations: &Equations,

@@ -93,7 +93,7 @@ impl Field {
         field.linear.inputs = mechanism.drives.len();
         field.add_sources();
         field.add_outputs();
-        field.calm = Calm::of((model, mode), &field.sources, &field.equations, &field.mass);
+        field.calm = Calm::new((model, mode), &field.sources, &field.equations, &field.mass);
         field
     }
 

@@ -232,7 +232,7 @@ impl Core {
             known: vec![Known { field, sets: Vec::new() }],
             present: 0,
             room: None,
-            stretch: Stretch::of(Pieces::held(&[], 0.0, 0.0), f64::INFINITY),
+            stretch: Stretch::new(Pieces::held(&[], 0.0, 0.0), f64::INFINITY),
             tau: 0.0,
             torque: [0.0; DRIVES],
             values: [0.0; MOST_GUARDS],
@@ -301,7 +301,7 @@ impl Engine for Core {
     }
 
     fn take_input(&mut self, pieces: &Pieces) {
-        self.take_up(Stretch::of(*pieces, f64::INFINITY));
+        self.take_up(Stretch::new(*pieces, f64::INFINITY));
     }
 
     /// Steps are as short as the inputs need by themselves.

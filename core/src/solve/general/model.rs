@@ -55,9 +55,13 @@ impl Phased {
         self.phases.torque(self.angle(y), self.currents.map(|place| y[place])).0
     }
 
-    fn of(mechanism: &Mechanism, layout: &Layout, (place, current): (&[usize; BODIES], &[Option<usize>])) -> Vec<Self> {
+    fn from_mechanism(
+        mechanism: &Mechanism,
+        layout: &Layout,
+        (place, current): (&[usize; BODIES], &[Option<usize>]),
+    ) -> Vec<Self> {
         let phased = |(drive, part): (usize, &crate::mechanism::Drive)| {
-            let phases = Phases::of(part)?;
+            let phases = Phases::new(part)?;
             let (spring, at) = mechanism.angle_of(drive)?;
             let first = mechanism.first_current(drive);
             Some(Self {
@@ -241,7 +245,7 @@ impl Model {
             }
         });
         let following = following.collect();
-        let phased = Phased::of(&mechanism, &layout, (&place, &current));
+        let phased = Phased::from_mechanism(&mechanism, &layout, (&place, &current));
         Self { mechanism, layout, place, current, bristle, adds, curved, following, phased }
     }
 

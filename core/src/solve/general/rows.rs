@@ -21,7 +21,7 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    pub(super) fn of<'s>(known: &'s mut Option<Self>, mechanism: &Mechanism, mode: &Mode) -> &'s Readout {
+    pub(super) fn readout<'s>(known: &'s mut Option<Self>, mechanism: &Mechanism, mode: &Mode) -> &'s Readout {
         let fits = known.as_ref().is_some_and(|known| known.mode == *mode);
         if !fits {
             *known = None;

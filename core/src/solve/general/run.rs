@@ -45,7 +45,7 @@ impl<'a> GeneralRun<'a> {
 
 impl Running for GeneralRun<'_> {
     fn set_input(&mut self, pieces: &Pieces) {
-        self.core.take_up(Stretch::of(*pieces, self.rows.grid.end()));
+        self.core.take_up(Stretch::new(*pieces, self.rows.grid.end()));
     }
 
     fn told(&self, pieces: Pieces) -> Pieces {

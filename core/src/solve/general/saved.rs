@@ -22,7 +22,7 @@ impl Core {
         pass.pieces(&mut pieces)?;
         let mut end = self.stretch.end;
         pass.number(&mut end)?;
-        self.stretch = Stretch::of(pieces, f64::INFINITY);
+        self.stretch = Stretch::new(pieces, f64::INFINITY);
         self.stretch.end = end;
         pass.number(&mut self.tau)?;
         pass.numbers(&mut self.torque)?;
@@ -49,6 +49,6 @@ impl Core {
     pub(super) fn hold_inputs(&mut self, inputs: &[f64], time: f64) {
         let passed = f64::max(time - self.time(), 0.0);
         self.rules.since_change += passed;
-        (self.stretch, self.tau) = (Stretch::of(Pieces::held(inputs, time, f64::INFINITY), f64::INFINITY), 0.0);
+        (self.stretch, self.tau) = (Stretch::new(Pieces::held(inputs, time, f64::INFINITY), f64::INFINITY), 0.0);
     }
 }

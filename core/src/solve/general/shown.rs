@@ -41,7 +41,7 @@ impl Rows<'_> {
             return;
         }
         let (model, mode) = (&*core.model, &core.rules.mode);
-        let readout = Shown::of(&mut self.shown, &model.mechanism, mode);
+        let readout = Shown::readout(&mut self.shown, &model.mechanism, mode);
         // A polynomial of degree seven follows what swings by a radian to 1e-9 of itself.
         let parts = ((way.until - way.from) / core.moment).ceil().clamp(1.0, MOST_PARTS);
         let place = |part: f64| way.from + (way.until - way.from) * (part / parts);
@@ -74,7 +74,7 @@ impl Rows<'_> {
         let (model, mode) = (&*core.model, &core.rules.mode);
         let (state, time) = (core.state(), core.time());
         let Some(observer) = &mut self.recorder.observer else { return };
-        let readout = Shown::of(&mut self.shown, &model.mechanism, mode);
+        let readout = Shown::readout(&mut self.shown, &model.mechanism, mode);
         let now = read(readout, model, mode, &core.y, &core.input());
         let (bow, few) = ([0.0; QUANTITIES], readout.few);
         observer.pass(&Gap { begin: time, length: 0.0, from: &now, to: &now, bow: &bow, mode, few });

@@ -112,7 +112,7 @@ pub(super) enum Guess {
 
 impl Guess {
     /// This guess for a step of length `h`, scaled by the ratio of the lengths.
-    pub(super) fn of(self, h: f64) -> Self {
+    pub(super) fn predict(self, h: f64) -> Self {
         match self {
             Guess::Constant => Guess::Constant,
             Guess::After(length) => Guess::After(h / length),

@@ -158,7 +158,7 @@ impl Core {
             let mut start =
                 Begin { y: &begin, input: stretch.inputs(from, set.h), degree: stretch.degree, strict: &strict };
             let number = self.present as u64;
-            let mut error = room.solve(&Step { field, number, set: &set, begin: &start, whole }, guess.of(set.h));
+            let mut error = room.solve(&Step { field, number, set: &set, begin: &start, whole }, guess.predict(set.h));
             // No step crosses a kink of a force, which quartics cannot describe.
             let mut is_cut = false;
             for _ in 0..SOLUTIONS {
@@ -174,7 +174,7 @@ impl Core {
                 (set, whole, is_cut) = (Arc::new(Set::new(&field.linear, h, stretch.degree)), false, true);
                 start.input = stretch.inputs(from, h);
                 let step = Step { field, number, set: &set, begin: &start, whole };
-                error = room.solve(&step, Guess::Within(longer).of(h));
+                error = room.solve(&step, Guess::Within(longer).predict(h));
             }
             let step = Step { field, number, set: &set, begin: &start, whole };
             let end = error.map(|_| room.end);
@@ -531,7 +531,7 @@ impl Dense<'_> {
         let set = Set::new(&field.linear, h, stretch.degree);
         let start = Begin { input: stretch.inputs(from, h), ..self.start };
         let step = Step { field, number, set: &set, begin: &start, whole: false };
-        let Some(error) = room.solve(&step, Guess::Within(self.h).of(h)) else {
+        let Some(error) = room.solve(&step, Guess::Within(self.h).predict(h)) else {
             *room = before;
             return f64::INFINITY;
         };

@@ -19,7 +19,7 @@ pub(super) struct Stretch {
 
 impl Stretch {
     /// One piece, up to `end` at most.
-    pub(super) fn of(pieces: Pieces, end: f64) -> Self {
+    pub(super) fn new(pieces: Pieces, end: f64) -> Self {
         Self { begin: pieces.start, end: pieces.end.min(end), pieces, degree: pieces.degree() }
     }
 

@@ -19,7 +19,7 @@ pub(crate) struct Columns<const N: usize>(pub(crate) Vec<(usize, [f64; N])>);
 
 impl<const N: usize> Columns<N> {
     /// Slopes of a matrix.
-    fn of(matrix: &Matrix<N, N>) -> Self {
+    fn new(matrix: &Matrix<N, N>) -> Self {
         let columns = matrix.column.iter().enumerate();
         Self(columns.filter(|(_, column)| column.iter().any(|c| *c != 0.0)).map(|(at, c)| (at, *c)).collect())
     }
@@ -83,7 +83,7 @@ impl<const N: usize> Matrix<N, N> {
                 return Columns(columns.collect());
             }
             let first = powers.slope(&of.matrix().scaled(h));
-            Columns::of(&before.iter().fold(first, |slope, step| {
+            Columns::new(&before.iter().fold(first, |slope, step| {
                 // L(2h) = 2 L + L P + P L
                 let mut doubled = slope.scaled(2.0);
                 doubled.add(&slope.product(step));

@@ -41,7 +41,7 @@ pub(super) struct Sheets {
 
 impl Sheets {
     /// Index of the sheet of a mode, which is prepared if new.
-    pub(super) fn of(&mut self, mechanism: &Mechanism, places: &Places, mode: &Mode) -> usize {
+    pub(super) fn index(&mut self, mechanism: &Mechanism, places: &Places, mode: &Mode) -> usize {
         if let Some(known) = self.sheets.iter().position(|sheet| sheet.mode == *mode) {
             return known;
         }

@@ -18,7 +18,7 @@ pub(crate) fn reproduced(case: &Case, log: &Log) -> Option<f64> {
     };
     let mut controller = Standard::new(design, &case.machine).ok()?;
     let profile = Profile::sampled(&log.time, reference).shaped(&design.shaper);
-    let timing = Loop::of(design);
+    let timing = Loop::new(design);
     let end = *log.time.last()?;
     // Straight lines between samples.
     let at = |values: &[f64], t: f64| {

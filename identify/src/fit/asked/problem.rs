@@ -50,7 +50,7 @@ pub struct Noise(pub Vec<(Quantity, f64)>);
 
 impl Noise {
     /// Standard deviation of a quantity; 1e-12 in its unit if there is none.
-    pub fn of(&self, quantity: Quantity) -> f64 {
+    pub fn deviation(&self, quantity: Quantity) -> f64 {
         self.0.iter().find(|(own, _)| *own == quantity).map_or(1e-12, |(_, deviation)| *deviation)
     }
 }
@@ -209,7 +209,7 @@ impl<'a> Problem<'a> {
             let given = case.experiments.iter().any(|e| e.name == run.name && e.initial != Default::default());
             let machine = &self.machine;
             let slides = 0..machine.geometry().slides.len();
-            let readings: Vec<_> = slides.map(|slide| Reading::of(run, machine, slide)).collect();
+            let readings: Vec<_> = slides.map(|slide| Reading::new(run, machine, slide)).collect();
             for (slide, reading) in readings.iter().enumerate() {
                 let start = Start { slide, reading: reading.as_ref(), noise: &noise };
                 let extras = start.extras(run, machine, (initial_state, given));
@@ -313,7 +313,7 @@ impl<'a> Problem<'a> {
         let of = |quantity: Quantity| noise.iter().find(|(own, _)| *own == quantity).map(|(_, deviation)| *deviation);
         for run in &mut self.runs {
             for slide in 0..self.machine.geometry().slides.len() {
-                let Some(reading) = Reading::of(run, &self.machine, slide) else { continue };
+                let Some(reading) = Reading::new(run, &self.machine, slide) else { continue };
                 let Some(deviation) = reading.deviation(run, of) else { continue };
                 let what = Nuisance::StartPosition(slide);
                 for extra in run.extras.iter_mut().filter(|extra| extra.what == what) {
@@ -731,7 +731,7 @@ pub(crate) fn extent(values: &[f64]) -> f64 {
 /// The share of the play of a sensor that lies ahead where a run begins: none if it begins in forward motion, all of it
 /// in backward motion.
 fn ahead(run: &FittedLog, quantity: Quantity, noise: &Noise, initial_state: bool) -> f64 {
-    let (slope, doubt) = Reading::of_output(run, quantity).speed_at_start(run, |own| Some(noise.of(own)));
+    let (slope, doubt) = Reading::of_output(run, quantity).speed_at_start(run, |own| Some(noise.deviation(own)));
     match initial_state || run.window > 0 {
         true if slope > STARTS_MOVING * doubt => 0.0,
         true if slope < -STARTS_MOVING * doubt => 1.0,
@@ -769,8 +769,9 @@ impl Start<'_> {
             let free = initial_state || windowed;
             // Positions count from where the log begins, unless the case says where that is; its first value says that
             // no better than any other value says where the slide is.
-            let noise =
-                self.reading.and_then(|reading| reading.deviation(run, |quantity| Some(self.noise.of(quantity))));
+            let noise = self
+                .reading
+                .and_then(|reading| reading.deviation(run, |quantity| Some(self.noise.deviation(quantity))));
             let noise = noise.unwrap_or_default();
             let (unit, room) = if free { (1e-2 * wide, wide) } else { (noise, 6.0 * noise) };
             if free || !given {
@@ -785,7 +786,7 @@ impl Start<'_> {
             }
         }
         if initial_state || windowed {
-            let of = |quantity| Some(self.noise.of(quantity));
+            let of = |quantity| Some(self.noise.deviation(quantity));
             let (slope, doubt) = self.reading.map_or((0.0, 0.0), |reading| reading.speed_at_start(run, of));
             // A log begins at rest unless it shows motion: a start at rest sticks, and a search from there does not
             // depend on the speed.

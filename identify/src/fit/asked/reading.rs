@@ -14,7 +14,7 @@ pub(crate) struct Reading {
 impl Reading {
     /// The position of a slide by the first output that shows it alone, or else by the angles of all drives; `None` if
     /// the log has neither.
-    pub fn of(run: &FittedLog, machine: &Machine, slide: usize) -> Option<Self> {
+    pub fn new(run: &FittedLog, machine: &Machine, slide: usize) -> Option<Self> {
         let (geometry, r) = (machine.geometry(), machine.pulley_radius);
         let arm = |quantity: Quantity| if quantity.is_linear() { 1.0 } else { r };
         let shows_alone = |quantity: Quantity| {

@@ -187,7 +187,7 @@ impl FittedLog {
     pub fn all(experiment: &Experiment, log: &Log, setting: &LogOptions) -> Vec<Self> {
         let end = log.time.last().copied().unwrap_or(0.0);
         let Some(window) = setting.window.filter(|window| *window < end) else {
-            return vec![Self::of(experiment, log, 0..log.time.len(), 0, setting)];
+            return vec![Self::new(experiment, log, 0..log.time.len(), 0, setting)];
         };
         let count = (end / window).round().max(1.0) as usize;
         let mut runs = Vec::new();
@@ -197,14 +197,14 @@ impl FittedLog {
             let last = log.time.partition_point(|&t| t < until);
             if last > first + 4 {
                 // The row at the seam belongs to both.
-                runs.push(Self::of(experiment, log, first..(last + 1).min(log.time.len()), k, setting));
+                runs.push(Self::new(experiment, log, first..(last + 1).min(log.time.len()), k, setting));
                 first = last;
             }
         }
         runs
     }
 
-    fn of(
+    fn new(
         experiment: &Experiment,
         log: &Log,
         rows: std::ops::Range<usize>,
@@ -449,7 +449,7 @@ impl FittedLog {
         let experiment = self.experiment(&mut machine, extras);
         let mut slopes: Vec<Vec<f64>> = vec![Vec::new(); quantities.len()];
         out.iter_mut().for_each(Vec::clear);
-        let solver = Solver::of(&machine);
+        let solver = Solver::for_machine(&machine);
         let shown = machine.clone();
         let mut take = |block: &Trajectory| {
             for (i, quantity) in quantities.iter().enumerate() {
@@ -671,7 +671,7 @@ mod tests {
         let changes = ["belt={ model = \"rigid\" }"];
         let case = Case::from_text_with("axis.toml", TEMPLATE, &changes).unwrap();
         let mut experiment = case.experiments[1].clone();
-        let rows = simulate(&case.machine, &experiment, Solver::of(&case.machine)).unwrap().trajectory;
+        let rows = simulate(&case.machine, &experiment, Solver::for_machine(&case.machine)).unwrap().trajectory;
         let column = |name: &str| rows.get(name).unwrap().to_vec();
         let outputs = [Quantity::CartPosition, Quantity::CartSpeed];
         let log = Log {

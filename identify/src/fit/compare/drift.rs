@@ -63,7 +63,7 @@ impl Drift {
         let alike = changes.partition_point(|change| change.left <= least * (1.0 + CHANGE_ALIKE) + 1e-12);
         // A pair precedes its members.
         let members = |change: &Change| change.estimate.name.split(" = ").count();
-        changes[..alike].sort_by_key(|change| (Cause::of(&change.estimate.name), std::cmp::Reverse(members(change))));
+        changes[..alike].sort_by_key(|change| (Cause::new(&change.estimate.name), std::cmp::Reverse(members(change))));
         Self { unchanged, changes, alike, work }
     }
 }
@@ -87,7 +87,7 @@ enum Cause {
 
 impl Cause {
     /// Cause of a change by its name: a key, several joined by ` = `, a sum, or a nuisance.
-    fn of(name: &str) -> Self {
+    fn new(name: &str) -> Self {
         let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
         match () {
             () if has(&["radius", "gear_ratio", "teeth", "pitch", "encoder", "length"]) => Self::Make,

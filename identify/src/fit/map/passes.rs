@@ -87,7 +87,7 @@ pub(super) fn passes(machine: &Machine, log: &Log, step: f64) -> Result<Vec<Pass
     let width = WIDTHS.into_iter().rev().find(|width| *width <= wanted).unwrap_or(WIDTHS[0]);
     let motion = derived(&way, width, h).ok_or_else(too_short)?;
     let (position, margin) = (averaged(&way, width), reach(width));
-    let (rigid, r) = (Rigid::of(machine), machine.pulley_radius);
+    let (rigid, r) = (Rigid::new(machine), machine.pulley_radius);
     let motor: Vec<f64> = (0..n)
         .map(|k| {
             // Speeds at the ends are those of the nearest row with a speed.

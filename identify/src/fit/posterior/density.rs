@@ -67,7 +67,7 @@ enum Change {
 
 impl Change {
     /// For a variable at `x` ± `deviation`.
-    fn of(x: f64, deviation: f64, low: f64, high: f64) -> Self {
+    fn new(x: f64, deviation: f64, low: f64, high: f64) -> Self {
         match (x - low < FELT * deviation, high - x < FELT * deviation) {
             (false, false) => Change::None,
             (true, false) => Change::Above(low),
@@ -184,7 +184,7 @@ impl<'a, R: Residuals + Clone + Send> Density<'a, R> {
             correlation,
             fixed: None,
         };
-        let near = |j: usize| Change::of(density.inside[j], density.errors[j], bounds.low[j], bounds.high[j]);
+        let near = |j: usize| Change::new(density.inside[j], density.errors[j], bounds.low[j], bounds.high[j]);
         density.change((0..n).map(near).collect());
         density.fixed = Some(density.bent(jacobian));
         density

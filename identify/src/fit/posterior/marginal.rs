@@ -101,13 +101,13 @@ impl<'a> Marginal<'a> {
     }
 
     /// The values of those that stay.
-    pub fn of<T: Clone>(&self, all: &[T]) -> Vec<T> {
+    pub fn select<T: Clone>(&self, all: &[T]) -> Vec<T> {
         self.kept.iter().map(|&j| all[j].clone()).collect()
     }
 
     /// The bounds of those that stay.
     pub fn bounds_of(&self, all: &Bounds) -> Bounds {
-        Bounds { low: self.of(&all.low), high: self.of(&all.high) }
+        Bounds { low: self.select(&all.low), high: self.select(&all.high) }
     }
 
     fn whole(&self, x: &[f64]) -> Vec<f64> {

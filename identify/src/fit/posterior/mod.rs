@@ -100,10 +100,10 @@ pub fn posterior(case: &Case, plan: &Plan, fit: &Fit, effort: Effort, watch: &Wa
     let marginal = Marginal::new(problem.clone(), (&at, &bounds), variance, &deviations, &|j| known[j]);
     let kept = marginal.kept().to_vec();
     let jacobian =
-        marginal.clone().jacobian(&marginal.of(&at), &[], &marginal.bounds_of(&bounds), &Differences::Central);
+        marginal.clone().jacobian(&marginal.select(&at), &[], &marginal.bounds_of(&bounds), &Differences::Central);
     let ingredients = Ingredients {
         problem: marginal.clone(),
-        at: marginal.of(&at),
+        at: marginal.select(&at),
         jacobian: jacobian.ok_or_else(failed)?,
         bounds: marginal.bounds_of(&bounds),
         priors: priors.into_iter().enumerate().filter(|(j, _)| kept.contains(j)).map(|(_, prior)| prior).collect(),

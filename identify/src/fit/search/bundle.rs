@@ -101,7 +101,7 @@ struct Promise {
 }
 
 impl Promise {
-    fn of(pieces: &[Piece], u: &DVector<f64>, cost: f64) -> Self {
+    fn new(pieces: &[Piece], u: &DVector<f64>, cost: f64) -> Self {
         let seen: Vec<(DVector<f64>, f64)> = pieces.iter().map(|piece| piece.seen_from(u, cost)).collect();
         let weights = balance(&seen);
         let (mut mean, mut beyond) = (DVector::zeros(u.len()), 0.0);
@@ -136,7 +136,7 @@ fn descend(
     let mut taken = 1;
     loop {
         let cost = unit * best.cost;
-        let promise = Promise::of(&pieces, &u, cost);
+        let promise = Promise::new(&pieces, &u, cost);
         let expected = (2.0 * promise.fall).sqrt();
         if expected <= tolerance || taken >= most {
             best.iterations += taken;

@@ -98,7 +98,7 @@ pub(crate) fn smoothed<'a>(problem: &'a Problem) -> Vec<Smoothed<'a>> {
     for run in problem.runs.iter().filter(|run| run.is_even()) {
         let seen = run.seen.iter().position(|seen| seen.quantity.is_position() && !seen.absolute);
         if let Some(output) = seen {
-            all.extend(Smoothed::new(run, &problem.machine, output, noise.of(run.seen[output].quantity)));
+            all.extend(Smoothed::new(run, &problem.machine, output, noise.deviation(run.seen[output].quantity)));
         }
     }
     all

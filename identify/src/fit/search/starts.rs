@@ -58,7 +58,7 @@ impl Searched<'_> {
     /// Deviations of the residuals relative to the noise of the logs.
     pub fn times_noise(&self) -> impl Iterator<Item = (Quantity, f64)> {
         let noise = self.problem.noise();
-        self.noise.iter().map(move |(quantity, deviation)| (*quantity, deviation / noise.of(*quantity)))
+        self.noise.iter().map(move |(quantity, deviation)| (*quantity, deviation / noise.deviation(*quantity)))
     }
 }
 
@@ -406,7 +406,7 @@ pub(crate) fn is_noise(problem: &Problem, at: &Minimum) -> bool {
             let of = |k: usize| at.residuals[first + output * n + k] / seen.weights[k];
             let own: Vec<f64> = (0..n).filter(|&k| seen.weights[k] > 0.0).map(of).collect();
             let mean = own.iter().map(|r| r * r).sum::<f64>() / own.len().max(1) as f64;
-            mean.sqrt() <= MORE_THAN_NOISE * noise.of(seen.quantity)
+            mean.sqrt() <= MORE_THAN_NOISE * noise.deviation(seen.quantity)
         })
     };
     problem.runs.iter().enumerate().all(is_own)

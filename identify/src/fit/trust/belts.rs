@@ -30,7 +30,7 @@ fn logarithm(machine: &Machine) -> f64 {
 impl Compared {
     /// The comparison at `x`; `None` for a machine with one drive, or if no free parameter changes the ratio. `of` is
     /// the standard error along a combination of directions, of which `lost` are not determined.
-    pub(super) fn of(
+    pub(super) fn new(
         problem: &Problem,
         directions: &Directions,
         lost: &[usize],

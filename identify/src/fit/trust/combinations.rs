@@ -22,7 +22,7 @@ pub struct Combination {
 
 /// Determined combinations of `members`, of which `lost` directions are not determined: each of them with the one that
 /// moves most along the lost direction, or with the two that do for two lost directions.
-pub(crate) fn of(
+pub(crate) fn combinations(
     problem: &Problem,
     directions: &Directions,
     names: &[String],

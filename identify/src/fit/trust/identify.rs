@@ -94,7 +94,7 @@ impl Identifiability {
             .collect();
         let singular = singular.iter().map(|s| s / deviation).collect();
         let hidden = v.select_columns(&lost);
-        let belts = Compared::of(problem, directions, &lost, x, of);
+        let belts = Compared::new(problem, directions, &lost, x, of);
         let mut result = Self { names, sensitivity, singular, error, groups: Vec::new(), lost: hidden, belts };
         result.groups = result.grouped(problem, directions, (&lost, off), x, of);
         result
@@ -143,7 +143,7 @@ impl Identifiability {
             let combinations = if determined == 0 {
                 Vec::new()
             } else {
-                combinations::of(problem, directions, &self.names, &members, lost, x, of)
+                combinations::combinations(problem, directions, &self.names, &members, lost, x, of)
             };
             groups.push(Group { members, determined, words, combinations });
         }
@@ -309,9 +309,9 @@ pub(crate) fn sum_of(machine: &crate::machine::Machine, parameters: &[&Free], we
         let mut own = 0.0;
         for (key, factor) in &free.keys {
             let (arm, symbol) = arm_and_symbol(key)?;
-            own += factor * arm.of(machine);
+            own += factor * arm.length(machine);
             parts.push(arm.times(symbol));
-            total += arm.of(machine) * value(machine, key)?;
+            total += arm.length(machine) * value(machine, key)?;
         }
         // All weights are the arms times one number, within a tenth, since the belt is elastic.
         let ratio = weight / own;
@@ -323,7 +323,7 @@ pub(crate) fn sum_of(machine: &crate::machine::Machine, parameters: &[&Free], we
     let is_free = |key: &str| parameters.iter().any(|free| free.keys.iter().any(|(own, _)| own == key));
     for row in sum.parts(true).filter(|row| !is_free(row.key)) {
         let (arm, symbol) = arm_and_symbol(row.key)?;
-        let own = arm.of(machine) * value(machine, row.key).unwrap_or(0.0);
+        let own = arm.length(machine) * value(machine, row.key).unwrap_or(0.0);
         if own != 0.0 {
             total += own;
             parts.push(arm.times(symbol));

@@ -40,7 +40,8 @@ pub(super) fn interruptions(case: &Case, plan: &Plan, found: &Searched) -> Vec<F
 /// Residuals in windows of this length, s, and what stands out.
 fn by_windows(case: &Case, plan: &Plan, found: &Searched, window: f64) -> Option<Vec<Finding>> {
     let noise = found.problem.noise();
-    let noise: Vec<_> = found.problem.quantities().into_iter().map(|quantity| (quantity, noise.of(quantity))).collect();
+    let noise: Vec<_> =
+        found.problem.quantities().into_iter().map(|quantity| (quantity, noise.deviation(quantity))).collect();
     let (problem, best) = in_windows(case, plan, found, window, (&noise, HUBER))?;
     // Root mean square of each window's residuals, log by log.
     let mut logs: Vec<(&str, Vec<(f64, f64)>)> = Vec::new();

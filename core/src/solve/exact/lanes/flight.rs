@@ -92,13 +92,13 @@ impl<T: Copy, const S: usize, const D: usize> Rates<T, S, D> {
 
 impl<const S: usize, const D: usize> Moving<Lanes, S, D> {
     #[inline(always)]
-    fn of<W: Wide<Kept = Lanes>>(&self) -> Moving<W, S, D> {
+    fn widen<W: Wide<Kept = Lanes>>(&self) -> Moving<W, S, D> {
         let mut all = Moving::all(W::all(0.0));
         for i in 0..S {
-            all.s[i] = W::of(&self.s[i]);
+            all.s[i] = W::load(&self.s[i]);
         }
         for i in 0..D {
-            all.d[i] = W::of(&self.d[i]);
+            all.d[i] = W::load(&self.d[i]);
         }
         all
     }
@@ -180,14 +180,14 @@ impl<const S: usize, const D: usize> Rates<Lanes, S, D> {
 /// Σ w z, its two parts side by side.
 #[inline(always)]
 fn dot<W: Wide, const S: usize, const D: usize>(weights: &Moving<W::Kept, S, D>, z: &Moving<W, S, D>) -> W {
-    let mut sum = W::of(&weights.s[0]).times(z.s[0]);
+    let mut sum = W::load(&weights.s[0]).times(z.s[0]);
     for i in 1..S {
-        sum = sum.plus(W::of(&weights.s[i]).times(z.s[i]));
+        sum = sum.plus(W::load(&weights.s[i]).times(z.s[i]));
     }
     if D > 0 {
-        let mut other = W::of(&weights.d[0]).times(z.d[0]);
+        let mut other = W::load(&weights.d[0]).times(z.d[0]);
         for i in 1..D {
-            other = other.plus(W::of(&weights.d[i]).times(z.d[i]));
+            other = other.plus(W::load(&weights.d[i]).times(z.d[i]));
         }
         sum = sum.plus(other);
     }
@@ -196,9 +196,9 @@ fn dot<W: Wide, const S: usize, const D: usize>(weights: &Moving<W::Kept, S, D>,
 
 #[inline(always)]
 fn dot_of_speeds<W: Wide, const S: usize>(weights: &[W::Kept; S], z: &[W; S]) -> W {
-    let mut sum = W::of(&weights[0]).times(z[0]);
+    let mut sum = W::load(&weights[0]).times(z[0]);
     for i in 1..S {
-        sum = sum.plus(W::of(&weights[i]).times(z[i]));
+        sum = sum.plus(W::load(&weights[i]).times(z[i]));
     }
     sum
 }
@@ -206,7 +206,7 @@ fn dot_of_speeds<W: Wide, const S: usize>(weights: &[W::Kept; S], z: &[W; S]) ->
 impl<T: Copy, const S: usize, const D: usize> Form<T, S, D> {
     #[inline(always)]
     pub(super) fn value<W: Wide<Kept = T>>(&self, z: &Moving<W, S, D>) -> W {
-        dot(&self.of, z).plus(W::of(&self.constant))
+        dot(&self.of, z).plus(W::load(&self.constant))
     }
 
     #[inline(always)]
@@ -224,7 +224,7 @@ impl<T: Copy, const S: usize, const D: usize> Rates<T, S, D> {
             rate.s[i] = self.s[i].value(z);
         }
         for i in 0..D {
-            rate.d[i] = dot_of_speeds(&self.d[i].0, &z.s).plus(W::of(&self.d[i].1));
+            rate.d[i] = dot_of_speeds(&self.d[i].0, &z.s).plus(W::load(&self.d[i].1));
         }
         rate
     }
@@ -518,22 +518,22 @@ impl<const S: usize, const D: usize> Flight<S, D> {
 
     #[inline(always)]
     fn fly_by<W: Wide<Kept = Lanes>>(&mut self) -> Calls {
-        let left = W::of(&self.length).minus(W::of(&self.time));
-        let longest = W::of(&self.longest);
+        let left = W::load(&self.length).minus(W::load(&self.time));
+        let longest = W::load(&self.longest);
         let over = !W::bits(W::below(longest, left)) & 0xff;
         let h = left.smaller(longest);
         h.keep(&mut self.h);
-        let (z, rate) = (self.from.z.of::<W>(), self.from.rate.of::<W>());
+        let (z, rate) = (self.from.z.widen::<W>(), self.from.rate.widen::<W>());
         self.rates.series(h, (&z, &rate), &mut self.terms);
 
         // The state at the end, the smallest terms first.
-        let mut end = self.terms[TERMS - 1].of::<W>();
+        let mut end = self.terms[TERMS - 1].widen::<W>();
         for k in (0..TERMS - 1).rev() {
             for i in 0..S {
-                end.s[i] = end.s[i].plus(W::of(&self.terms[k].s[i]));
+                end.s[i] = end.s[i].plus(W::load(&self.terms[k].s[i]));
             }
             for i in 0..D {
-                end.d[i] = end.d[i].plus(W::of(&self.terms[k].d[i]));
+                end.d[i] = end.d[i].plus(W::load(&self.terms[k].d[i]));
             }
         }
         keep(&end, &mut self.to.z);
@@ -541,13 +541,13 @@ impl<const S: usize, const D: usize> Flight<S, D> {
         keep(&rate, &mut self.to.rate);
 
         // √(2V) of the term of order four is h⁴/24 times that of z⁗.
-        let fourth = self.terms[4].of::<W>();
+        let fourth = self.terms[4].widen::<W>();
         let mut squares = W::all(0.0);
         for form in &self.energy {
             let part = dot(form, &fourth);
             squares = squares.plus(part.times(part));
         }
-        let rest = squares.root().times(W::of(&self.grow)).times(W::all(FOURTH * INNER));
+        let rest = squares.root().times(W::load(&self.grow)).times(W::all(FOURTH * INNER));
         rest.keep(&mut self.rest);
 
         let mut low = W::all(0.0);
@@ -557,17 +557,17 @@ impl<const S: usize, const D: usize> Flight<S, D> {
             let (value, slope) = (guard.form.value(&end), guard.form.change(&rate));
             value.keep(&mut to[0]);
             slope.keep(&mut to[1]);
-            let (begin, rest) = (W::of(&from[0]), rest.times(W::of(&guard.dual)));
-            let one = begin.plus(third.times(W::of(&from[1])));
+            let (begin, rest) = (W::load(&from[0]), rest.times(W::load(&guard.dual)));
+            let one = begin.plus(third.times(W::load(&from[1])));
             let two = value.minus(third.times(slope));
             let highest = begin.larger(value).larger(one.larger(two).plus(rest));
-            let room = W::of(&guard.top).minus(highest);
+            let room = W::load(&guard.top).minus(highest);
             let (mut begin, mut one, mut two) = (begin, one.minus(rest), two.minus(rest));
             if self.is_fresh {
                 // What is zero by definition is not looked at.
-                let (zero, fresh) = (W::all(0.0), W::of(&guard.fresh));
+                let (zero, fresh) = (W::all(0.0), W::load(&guard.fresh));
                 let (first, second) = (W::below(zero, fresh), W::below(W::all(1.0), fresh));
-                one = W::pick(first, third.times(W::of(&from[1])).minus(rest), one);
+                one = W::pick(first, third.times(W::load(&from[1])).minus(rest), one);
                 one = W::pick(second, zero, one);
                 two = W::pick(second, two.minus(rest.times(W::all(3.0))), two);
                 begin = W::pick(first, zero, begin);
@@ -615,17 +615,17 @@ impl<const S: usize, const D: usize> Flight<S, D> {
 
     #[inline(always)]
     fn land_by<W: Wide<Kept = Lanes>>(&mut self, ended: u32) -> u32 {
-        let (h, time, length) = (W::of(&self.h), W::of(&self.time), W::of(&self.length));
-        let (end, rate) = (self.to.z.of::<W>(), self.to.rate.of::<W>());
-        let (rest, third) = (W::of(&self.rest), h.times(W::all(THIRD)));
+        let (h, time, length) = (W::load(&self.h), W::load(&self.time), W::load(&self.length));
+        let (end, rate) = (self.to.z.widen::<W>(), self.to.rate.widen::<W>());
+        let (rest, third) = (W::load(&self.rest), h.times(W::all(THIRD)));
         let left = length.minus(time);
-        let next = W::pick(W::below(W::of(&self.longest), left), time.plus(h), length);
+        let next = W::pick(W::below(W::load(&self.longest), left), time.plus(h), length);
         // What does not go takes nothing.
         let mut least = Lanes::all(f64::MIN_POSITIVE);
         for (lane, least) in least.0.iter_mut().enumerate() {
             *least = if ended >> lane & 1 == 0 { f64::MIN_POSITIVE } else { f64::INFINITY };
         }
-        let least = W::of(&least);
+        let least = W::load(&least);
         let (zero, never) = (W::all(0.0), W::all(f64::INFINITY));
         let mut any = 0;
         let all = self.quantities.iter().zip(&self.from.quantities).zip(&mut self.to.quantities);
@@ -633,10 +633,10 @@ impl<const S: usize, const D: usize> Flight<S, D> {
             let (value, slope) = (quantity.form.value(&end), quantity.form.change(&rate));
             value.keep(&mut to[0]);
             slope.keep(&mut to[1]);
-            let (begin, steep) = (W::of(&from[0]), W::of(&from[1]));
+            let (begin, steep) = (W::load(&from[0]), W::load(&from[1]));
             let one = begin.plus(third.times(steep)).abs();
             let two = value.minus(third.times(slope)).abs();
-            let (new, peak) = (value.abs(), W::of(&heights.peak));
+            let (new, peak) = (value.abs(), W::load(&heights.peak));
             let old = peak.abs();
             // What comes to a value as large as any before takes its time, as the last of equal ones; what is held does
             // not.
@@ -647,8 +647,8 @@ impl<const S: usize, const D: usize> Flight<S, D> {
             let most = new.larger(old);
             let signed = W::pick(W::below(value, zero), zero.minus(most), most);
             W::pick(stays, peak, signed).keep(&mut heights.peak);
-            W::pick(stays, W::of(&heights.when), next).keep(&mut heights.when);
-            let rest = rest.times(W::of(&quantity.dual));
+            W::pick(stays, W::load(&heights.when), next).keep(&mut heights.when);
+            let rest = rest.times(W::load(&quantity.dual));
             let inner = one.larger(two).plus(rest);
             // Between its ends a course is highest only if its slope changes sign; that is off the slope of the cubic
             // by 3.1 times the rest at most.
@@ -663,20 +663,20 @@ impl<const S: usize, const D: usize> Flight<S, D> {
             any |= heights.within;
         }
         for ((speed, way), farthest) in self.ways.iter_mut().zip(&mut self.farthest) {
-            let mut sum = W::of(&self.terms[TERMS - 1].s[*speed]).times(W::all(RECIPROCAL[TERMS]));
+            let mut sum = W::load(&self.terms[TERMS - 1].s[*speed]).times(W::all(RECIPROCAL[TERMS]));
             for k in (0..TERMS - 1).rev() {
-                sum = sum.plus(W::of(&self.terms[k].s[*speed]).times(W::all(RECIPROCAL[k + 1])));
+                sum = sum.plus(W::load(&self.terms[k].s[*speed]).times(W::all(RECIPROCAL[k + 1])));
             }
-            let here = W::of(way);
-            here.abs().larger(W::of(farthest)).keep(farthest);
+            let here = W::load(way);
+            here.abs().larger(W::load(farthest)).keep(farthest);
             here.plus(sum.times(h)).keep(way);
         }
-        let begin = self.from.z.of::<W>();
+        let begin = self.from.z.widen::<W>();
         for i in 0..S {
-            begin.s[i].abs().larger(W::of(&self.largest.s[i])).keep(&mut self.largest.s[i]);
+            begin.s[i].abs().larger(W::load(&self.largest.s[i])).keep(&mut self.largest.s[i]);
         }
         for i in 0..D {
-            begin.d[i].abs().larger(W::of(&self.largest.d[i])).keep(&mut self.largest.d[i]);
+            begin.d[i].abs().larger(W::load(&self.largest.d[i])).keep(&mut self.largest.d[i]);
         }
         next.keep(&mut self.time);
         if self.is_fresh {

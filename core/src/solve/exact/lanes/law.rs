@@ -18,7 +18,7 @@ pub(super) struct Parts {
 }
 
 impl Parts {
-    pub(super) fn of(mechanism: &Mechanism, space: &Space) -> Self {
+    pub(super) fn new(mechanism: &Mechanism, space: &Space) -> Self {
         let layout = &space.layout;
         let bodies = layout.bodies();
         let mut s: Vec<usize> = (0..bodies).map(|body| layout.speed[body]).collect();
@@ -68,7 +68,7 @@ impl<const N: usize> Plan<N> {
     }
 
     /// The moving part of z.
-    pub(super) fn of<const S: usize, const D: usize>(&self, z: &[f64; N]) -> Moving<f64, S, D> {
+    pub(super) fn moving_part<const S: usize, const D: usize>(&self, z: &[f64; N]) -> Moving<f64, S, D> {
         self.moving(|place| z[place])
     }
 
@@ -108,14 +108,14 @@ pub(super) struct ReadingSlot {
 
 impl ReadingSlot {
     /// The quantity by the value in its slot.
-    pub(super) fn of(self, value: f64) -> f64 {
+    pub(super) fn reading(self, value: f64) -> f64 {
         (self.factor * value).clamp(-self.limit, self.limit)
     }
 }
 
 impl<const S: usize, const D: usize> Readings<S, D> {
     /// Those of these sums of readings; none if one of them is a way, or is not held by any spring.
-    pub(super) fn of<const N: usize>(
+    pub(super) fn from_shown<const N: usize>(
         shown: &matrices::Shown<N>,
         sums: &[Vec<(usize, f64)>],
         plan: &Plan<N>,
@@ -218,7 +218,7 @@ fn part(cause: Cause) -> u16 {
 }
 
 impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
-    pub(super) fn of(core: &Core<N>, readings: Arc<Readings<S, D>>, plan: &Plan<N>, slots: &mut Slots) -> Self {
+    pub(super) fn new(core: &Core<N>, readings: Arc<Readings<S, D>>, plan: &Plan<N>, slots: &mut Slots) -> Self {
         let matrices = Arc::clone(&core.matrices);
         let matrix = matrices.rates();
         let (mut rates, mut fixed) = (Rates::all(0.0), Vec::with_capacity(8));

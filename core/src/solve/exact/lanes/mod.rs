@@ -129,7 +129,7 @@ pub(in crate::solve) fn run_beside<'a, 'j, E: Extremes>(
 
 fn run_queue<'a>(mechanism: &Mechanism, degree: usize, jobs: &mut dyn Iterator<Item = Queued<'a>>) {
     let space = Space::new(mechanism, degree);
-    let parts = Parts::of(mechanism, &space);
+    let parts = Parts::new(mechanism, &space);
     // For a vector of the exact solver, speeds and currents, lengths and straight inputs: an axis; one with ramps,
     // inductance or ends, or a gantry; anything else.
     match (space.size(), parts.s.len(), parts.d.len()) {
@@ -263,7 +263,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         while let Some((mechanism, mut next)) = self.jobs.next() {
             // Lengths of springs weigh angles by the radii of this machine.
             let space = Arc::new(Space::new(&mechanism, self.degree));
-            if !takes(&mechanism, self.degree) || Parts::of(&mechanism, &space) != self.plan.parts {
+            if !takes(&mechanism, self.degree) || Parts::new(&mechanism, &space) != self.plan.parts {
                 next.into_iter().for_each(|(_, watcher)| watcher.receive(None));
                 continue;
             }
@@ -295,7 +295,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             kept.known = core.known;
             return self.begin(lane, kept, next);
         }
-        let pieces = Pieces::of(&experiment.inputs, 0.0);
+        let pieces = Pieces::new(&experiment.inputs, 0.0);
         let (piece_end, end) = (pieces.end.min(grid.end()), grid.end());
         let (law, held, steps) = (None, Vec::with_capacity(4), 0.0);
         let (starts, later) = self.spare.pop().unwrap_or_default();
@@ -333,10 +333,10 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
     fn prepare(&self, core: &mut Core<N>, kept: &mut Kept<N, S, D>, observer: &dyn Extremes) -> Option<()> {
         let (mechanism, space) = (&core.common.mechanism, &core.common.space);
         let mode = all_slide(&core.common.rules.mode, mechanism);
-        let (matrices, _) = ModeMatrices::of(&mut core.known, mechanism, space, &mode, core.common.h);
+        let (matrices, _) = ModeMatrices::from_known(&mut core.known, mechanism, space, &mode, core.common.h);
         let alike = reads_alike(mechanism);
         let shown = matrices.shown(mechanism, space);
-        let (readings, seen) = Readings::of(shown, observer.quantities(), &self.plan, alike)?;
+        let (readings, seen) = Readings::from_shown(shown, observer.quantities(), &self.plan, alike)?;
         kept.readings = alike.then(|| Arc::new(readings));
         kept.seen = seen;
         kept.fastest = matrices.norm(mechanism, &space.layout) / flight::REACH;
@@ -391,7 +391,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
                 if is_over && seat.pieces.end > seat.end {
                     return self.end_run(lane);
                 }
-                seat.pieces = Pieces::of(&seat.experiment.inputs, seat.piece_end);
+                seat.pieces = Pieces::new(&seat.experiment.inputs, seat.piece_end);
                 seat.piece_end = seat.pieces.end.min(seat.end);
                 self.take_input(lane);
                 if is_over {
@@ -422,12 +422,12 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
                     Some(readings) => Arc::clone(readings),
                     None => {
                         let shown = core.matrices.shown(&core.common.mechanism, &core.common.space);
-                        let own = Readings::of(shown, watcher.observed().quantities(), plan, false);
+                        let own = Readings::from_shown(shown, watcher.observed().quantities(), plan, false);
                         let Some((own, _)) = own else { return false };
                         Arc::new(own)
                     }
                 };
-                laws.push(Law::of(core, readings, plan, slots));
+                laws.push(Law::new(core, readings, plan, slots));
                 laws.len() - 1
             }
         };
@@ -473,7 +473,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         if seat.watcher.observed().steady().is_some() {
             let seen = *seat.kept.seen.last().expect("a last quantity");
             let quantity = seat.law().readings.with(seen.slot, &seat.core.z);
-            let value = seen.of(quantity.form.value(&seat.plan.of(&seat.core.z)));
+            let value = seen.reading(quantity.form.value(&seat.plan.moving_part(&seat.core.z)));
             let _ = seat.watcher.observer().pass_steady((base + begin, base + length), [value; 2], (value, value));
         }
         true
@@ -486,7 +486,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
         let Some(seat) = &mut seats[lane] else { return };
         let Some(law) = seat.law.map(|law| &seat.kept.laws[law]) else { return };
         let core = &seat.core;
-        let (z, now) = (plan.of(&core.z), core.common.base + core.common.offset);
+        let (z, now) = (plan.moving_part(&core.z), core.common.base + core.common.offset);
         let rate = law.rates(&core.z).rate(&z);
         flight.set(lane, &z, &rate);
         for (way, (place, _)) in flight.ways.iter_mut().zip(&plan.parts.ways) {
@@ -704,7 +704,7 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
     fn see_values(&mut self, now: f64) {
         for slot in 0..self.tops.len() {
             let quantity = self.law().readings.with(slot, &self.core.z);
-            let value = quantity.form.value(&self.plan.of(&self.core.z));
+            let value = quantity.form.value(&self.plan.moving_part(&self.core.z));
             self.see_value(slot, value, now);
         }
     }
@@ -727,7 +727,7 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
         let observer = self.watcher.observer();
         let sought = observer.sought();
         for (quantity, seen) in self.kept.seen.iter().enumerate().take(sought).filter(|(_, seen)| seen.slot == slot) {
-            tell(observer, quantity, seen.of(value));
+            tell(observer, quantity, seen.reading(value));
         }
     }
 
@@ -780,14 +780,14 @@ impl<const N: usize, const S: usize, const D: usize> Seat<'_, N, S, D> {
         let seen = *self.kept.seen.last().expect("a last quantity");
         let (low, high) = part.range();
         let (low, high) = (seen.factor * low, seen.factor * high);
-        let values = part.values.map(|value| seen.of(value));
+        let values = part.values.map(|value| seen.reading(value));
         if self.watcher.observer().pass_steady(times, values, (low.min(high), low.max(high))) {
             let (law, held) = (self.law.expect("taken up"), self.held.len() - 1);
             let start = Start { law, held, z: *z, begin: times.0, length: times.1 - times.0 };
             let course = self.course(seen.slot, &start);
             self.watcher.observer().see_steady(times, &|from| {
                 let (least, greatest) = part.extremes_from(&course, from);
-                let [a, b] = [seen.of(least), seen.of(greatest)];
+                let [a, b] = [seen.reading(least), seen.reading(greatest)];
                 (a.min(b), a.max(b))
             });
         }

@@ -29,7 +29,7 @@ pub(super) trait Wide: Copy {
     type Kept: Copy;
     /// The result of a comparison.
     type Mask: Copy;
-    fn of(kept: &Self::Kept) -> Self;
+    fn load(kept: &Self::Kept) -> Self;
     fn keep(self, kept: &mut Self::Kept);
     fn all(value: f64) -> Self;
     fn plus(self, other: Self) -> Self;
@@ -52,7 +52,7 @@ impl Wide for f64 {
     type Kept = f64;
     type Mask = bool;
     #[inline(always)]
-    fn of(kept: &f64) -> Self {
+    fn load(kept: &f64) -> Self {
         *kept
     }
     #[inline(always)]
@@ -124,7 +124,7 @@ impl Wide for Plain {
     type Kept = Lanes;
     type Mask = [bool; LANES];
     #[inline(always)]
-    fn of(kept: &Lanes) -> Self {
+    fn load(kept: &Lanes) -> Self {
         Self(kept.0)
     }
     #[inline(always)]
@@ -198,7 +198,7 @@ mod x86 {
         type Kept = Lanes;
         type Mask = __mmask8;
         #[inline(always)]
-        fn of(kept: &Lanes) -> Self {
+        fn load(kept: &Lanes) -> Self {
             Self(unsafe { _mm512_load_pd(kept.0.as_ptr()) })
         }
         #[inline(always)]
@@ -259,7 +259,7 @@ mod x86 {
         type Kept = Lanes;
         type Mask = (__m256d, __m256d);
         #[inline(always)]
-        fn of(kept: &Lanes) -> Self {
+        fn load(kept: &Lanes) -> Self {
             unsafe { Self(_mm256_load_pd(kept.0.as_ptr()), _mm256_load_pd(kept.0[4..].as_ptr())) }
         }
         #[inline(always)]

@@ -147,7 +147,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         let signals = &self.task.experiment.inputs[..];
         let mut time = 0.0;
         loop {
-            let pieces = Pieces::of(signals, time);
+            let pieces = Pieces::new(signals, time);
             self.seam(&pieces)?;
             if time >= self.grid.end() {
                 break;
@@ -243,7 +243,7 @@ impl<'t, const N: usize> Follower<'t, N> {
                 Some(known) => known,
                 None => {
                     let changes = self.varied.iter().flatten().filter(|varied| !varied.is_start).collect::<Vec<_>>();
-                    let sloped = Sloped::of(&mut self.slopes, law, &self.seen, &changes)?;
+                    let sloped = Sloped::from_known(&mut self.slopes, law, &self.seen, &changes)?;
                     let (seen, varied) = (&self.seen, &self.varied);
                     self.tangents.push(Tangent::new::<N>(sloped, &law.mode, seen, varied, self.task.outputs)?);
                     self.tangents.len() - 1

@@ -59,7 +59,7 @@ impl Varied {
 
     fn rows<const N: usize>(&self, here: &[[f64; N]], first: &[[f64; N]], second: &[[f64; N]]) -> Vec<Sparse> {
         let rows = here.iter().zip(first).zip(second);
-        rows.map(|((here, first), second)| Sparse::of(self.row(here, first, second))).collect()
+        rows.map(|((here, first), second)| Sparse::new(self.row(here, first, second))).collect()
     }
 }
 
@@ -67,7 +67,7 @@ impl Varied {
 pub(super) struct Sparse(Vec<(usize, f64)>);
 
 impl Sparse {
-    fn of<const N: usize>(row: [f64; N]) -> Self {
+    fn new<const N: usize>(row: [f64; N]) -> Self {
         Self(row.into_iter().enumerate().filter(|(_, weight)| *weight != 0.0).collect())
     }
 
@@ -93,7 +93,7 @@ pub(in crate::solve::exact) struct Sloped<const N: usize> {
 
 impl<const N: usize> Sloped<N> {
     /// Derivatives of the mode of `law`, known or new; `None` if a variable changes the guards of the mode.
-    pub(super) fn of(
+    pub(super) fn from_known(
         known: &mut Vec<Self>,
         law: &Arc<ModeMatrices<N>>,
         seen: &RelativeMachine,
@@ -187,7 +187,7 @@ impl Tangent {
             let some = slopes.into_iter().enumerate().filter(|(_, slope)| !slope.0.is_empty());
             output_slopes.extend(some.map(|(i, slope)| (i, j, slope)));
         }
-        Some(Self { sloped, outputs: here.into_iter().map(Sparse::of).collect(), output_slopes })
+        Some(Self { sloped, outputs: here.into_iter().map(Sparse::new).collect(), output_slopes })
     }
 }
 

@@ -168,7 +168,7 @@ impl<'a> Chain<'a> {
         (self.diverged, self.accepted) = (false, [0.0; 2]);
         self.kick();
         let energy = self.at.energy();
-        let mut path = Stretch::of(self.at.clone(), 0.0);
+        let mut path = Stretch::new(self.at.clone(), 0.0);
         for doublings in 0..MOST_DOUBLINGS {
             let way = if uniform(&mut self.random) < 0.5 { PathDirection::Back } else { PathDirection::Forth };
             let Ok(more) = self.extended(&path.ends[way as usize].clone(), way, doublings, energy) else { break };
@@ -205,12 +205,12 @@ impl<'a> Chain<'a> {
         self.accepted[0] += if gain.is_nan() { 0.0 } else { exp(gain.min(0.0)) };
         self.accepted[1] += 1.0;
         self.diverged |= gain.is_nan() || gain <= -LARGEST_ERROR;
-        if self.diverged { Err(Ended) } else { Ok(Stretch::of(point, gain)) }
+        if self.diverged { Err(Ended) } else { Ok(Stretch::new(point, gain)) }
     }
 }
 
 impl Stretch {
-    fn of(point: Point, weight: f64) -> Self {
+    fn new(point: Point, weight: f64) -> Self {
         Self { ends: [point.clone(), point.clone()], momenta: point.momentum.clone(), weight, chosen: point }
     }
 
