@@ -326,15 +326,16 @@ pub fn table(outcomes: &[Outcome]) -> String {
     text
 }
 
-/// The stages that do not agree, with their cases.
+/// The unexplained stages and those beyond their stated accuracy, or `all` that do not agree, with their cases.
 pub fn told(seed: u64, outcomes: &[Outcome], all: bool) -> String {
     let mut text = String::new();
     for outcome in outcomes {
         for compared in &outcome.compared {
-            if compared.verdict.is_unexplained() || (all && compared.verdict != Verdict::Agrees) {
+            if compared.verdict.is_unexplained() || compared.exceeds || (all && compared.verdict != Verdict::Agrees) {
                 let way = compared.by.name();
                 let (number, word, why) = (outcome.number, compared.verdict.word(), compared.verdict.told());
-                let _ = writeln!(text, "# seed {seed}, stage {number}, {way}, {word}: {why}\n{}", outcome.text);
+                let beyond = if compared.exceeds { ", beyond its stated accuracy" } else { "" };
+                let _ = writeln!(text, "# seed {seed}, stage {number}, {way}, {word}{beyond}: {why}\n{}", outcome.text);
             }
         }
     }
@@ -351,6 +352,8 @@ pub fn json(hunt: &Hunt, outcomes: &[Outcome]) -> Value {
             "verdict": compared.verdict.word(),
             "told": compared.verdict.told(),
             "difference_m": compared.difference,
+            "allowed_m": compared.allowed,
+            "is_beyond_stated": compared.exceeds,
             "perturbed_m": compared.spread,
             "case": outcome.text,
         })
