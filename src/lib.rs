@@ -58,6 +58,11 @@
 //! - [`export`]: machines and controllers as texts for other tools. [`stages`]: machines to begin with.
 //! - `json`: results as data (feature `json`).
 //!
+//! # Later versions
+//!
+//! Results, and enumerations that will get further variants, are `#[non_exhaustive]`: further fields and variants do not
+//! break a program that reads them. What a program makes itself (machines, experiments, signals, designs) is complete.
+//!
 //! # Features
 //!
 //! `parquet` adds Parquet files; `json` adds results as data. Without them the library is the physics alone. Figures

@@ -37,6 +37,7 @@ const MAIN: [&str; 10] = [
 
 /// Masses, stiffnesses, frequencies and limits of a machine.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Overview {
     /// The title of the case.
     pub title: String,
@@ -54,6 +55,7 @@ pub struct Overview {
 
 /// Rows about one thing.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Group {
     /// In a word for programs.
     pub key: &'static str,
@@ -65,6 +67,7 @@ pub struct Group {
 
 /// One answer.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Row {
     /// Unique within an overview.
     pub key: String,
@@ -80,6 +83,7 @@ pub struct Row {
 
 /// The machine with cart (and bridge) at one place.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct FiguresAt {
     /// x of the cart of an axis; x of the bridge and y of the cart of a gantry, m.
     pub position: Vec<f64>,

@@ -9,6 +9,7 @@ use crate::trajectory::Trajectory;
 
 /// How far a reduced model is from the elastic one on one experiment.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Reduction {
     /// x of the reduced model − x of the elastic one, where it is largest, m.
     pub cart: Peak,

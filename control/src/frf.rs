@@ -75,6 +75,7 @@ pub struct Cut {
 
 /// A point of a frequency response.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Point {
     /// rad/s.
     pub omega: f64,
@@ -90,6 +91,7 @@ pub struct Point {
 
 /// A frequency response from one log, or from several combined.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Frf {
     /// Name of the log, or of several, separated by commas.
     pub name: String,
@@ -232,6 +234,7 @@ fn untold(kind: MachineKind, spectra: &Spectra) -> Vec<Error> {
 
 /// A measured response with that of the model.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Response {
     /// The measured response.
     pub frf: Frf,

@@ -87,6 +87,7 @@ pub struct Trial {
 
 /// The size of an error.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Size {
     /// Root mean square, m.
     pub rms: f64,
@@ -108,6 +109,7 @@ impl Size {
 
 /// Predicted errors of a repetition: on the nominal machine, and the largest over the family.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Predicted {
     /// On the machine of the file.
     pub nominal: Size,
@@ -117,6 +119,7 @@ pub struct Predicted {
 
 /// The learning at one frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Point {
     /// Hz.
     pub frequency: f64,
@@ -128,6 +131,7 @@ pub struct Point {
 
 /// The signal of a drive.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct DriveSignal {
     /// Signal of the trial, V or A.
     pub before: Vec<f64>,
@@ -144,6 +148,7 @@ impl DriveSignal {
 
 /// Error of a sliding part.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SlideError {
     /// Error of the trial, m: reference minus position.
     pub error: Vec<f64>,
@@ -157,6 +162,7 @@ pub struct SlideError {
 
 /// The next signal, and its predicted effect.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Learned {
     /// Interval between values, s: the controller's sample time.
     pub every: f64,

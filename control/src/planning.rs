@@ -35,6 +35,7 @@ const NEVER: f64 = 1e12;
 
 /// Arrival: time from the start of the move until the cart stays in its window, in closed loop.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Arrival {
     /// Duration of the reference, s.
     pub duration: f64,
@@ -53,6 +54,7 @@ pub struct Arrival {
 
 /// A tried plan.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Tried {
     /// Limits of its strokes.
     pub limits: Limits,
@@ -66,6 +68,7 @@ pub struct Tried {
 
 /// The plan of a move.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Planned {
     /// Index of the move in the case.
     pub place: usize,
@@ -96,6 +99,7 @@ pub struct Planned {
 
 /// The plans of a case.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Plans {
     /// The family of machines.
     pub family: Family,

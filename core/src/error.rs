@@ -24,6 +24,7 @@ pub struct Error {
 
 /// A place in a file, or on the command line.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct SourceLocation {
     /// The file, as the user named it; or a word such as `--set`.
     pub file: PathBuf,
@@ -33,6 +34,7 @@ pub struct SourceLocation {
 
 /// An extent within one line of a text.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Span {
     /// Line number, from 1.
     pub line: usize,

@@ -52,6 +52,7 @@ pub struct Metrics {
 
 /// Yaw of a bridge.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct OfYaw {
     /// At the end, rad.
     pub angle: f64,
@@ -61,6 +62,7 @@ pub struct OfYaw {
 
 /// Steps that a stepper lost.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct LostSteps {
     /// Full steps by which the rotor is behind its field at the end: four for each tooth pitch.
     pub at_end: i64,
@@ -72,6 +74,7 @@ pub struct LostSteps {
 
 /// Figures of a sliding part.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct OfLoad {
     /// Final position, m.
     pub position: f64,
@@ -91,6 +94,7 @@ pub struct OfLoad {
 
 /// Figures of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct OfDrive {
     /// The angle of its pulley at the end, rad.
     pub angle: f64,
@@ -158,6 +162,7 @@ pub struct Peak {
 
 /// Numbers of stops, starts and reversals of a body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct EventCount {
     /// It came to rest.
     pub stops: u64,

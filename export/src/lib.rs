@@ -30,6 +30,7 @@ use std::borrow::Cow;
 
 /// A target whose files are made here.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Target {
     /// C99.
     C,
@@ -55,6 +56,7 @@ impl Target {
 
 /// A part of a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Part {
     /// The machine.
     Plant,

@@ -7,6 +7,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 /// How one number varies.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Distribution {
     /// One of these, each equally likely.
     Values(Vec<f64>),

@@ -13,6 +13,7 @@ const ENDS: [f64; 2] = [0.025, 0.975];
 
 /// The indices of one parameter, each with its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Index {
     /// S_i: the share of the variance that this parameter makes by itself.
     pub first: Estimate,

@@ -53,6 +53,7 @@ use std::sync::Arc;
 
 /// How a run ended, as the number in a column `status`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Status {
     /// At the end of the experiment.
     Complete,
@@ -120,6 +121,7 @@ struct Draws {
 
 /// Something that each machine does, and what is told of it.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Group {
     /// Its name.
     pub name: String,

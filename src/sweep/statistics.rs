@@ -4,6 +4,7 @@ use crate::chance::quantile;
 
 /// How the values of one column are spread; those that are NaN apart.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Spread {
     /// Values that are numbers.
     pub count: usize,

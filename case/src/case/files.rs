@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 /// The experiments whose files are read: logs, and inputs that are columns of files.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Files<'a> {
     /// The files of all experiments.
     All,
@@ -21,6 +22,7 @@ pub enum Files<'a> {
 
 /// A file that an input or a log is read from.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct InputFile {
     /// Where it is: the path in the text, from the case's folder on.
     pub path: PathBuf,
@@ -30,6 +32,7 @@ pub struct InputFile {
 
 /// An experiment whose files were not read.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Unread {
     /// Its name; runs of a log that is split have names that begin with it and `/`.
     pub name: String,

@@ -71,6 +71,7 @@ impl Default for Plan {
 
 /// The groups that have a value of a separate parameter for themselves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Per {
     /// The experiments of a campaign together.
     #[default]
@@ -162,6 +163,7 @@ pub struct Nuisances {
 
 /// For which logs a number holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Scope {
     /// It is not fitted.
     #[default]

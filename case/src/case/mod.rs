@@ -90,6 +90,7 @@ pub struct Case {
 
 /// The machines that a command takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Accepted {
     /// All of them.
     All,

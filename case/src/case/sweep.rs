@@ -14,6 +14,7 @@ const MOST_VALUES: usize = 100_000;
 
 /// The plan of `taut sweep`.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Sweeping {
     /// How many machines are run; none where the design says it.
     pub runs: Option<u64>,
@@ -97,6 +98,7 @@ impl Sampling {
 
 /// How the machines of a sweep are run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Running {
     /// Side by side where that is faster, the others one by one.
     Beside,
@@ -138,6 +140,7 @@ pub enum Kinds {
 
 /// The result of a fit that machines are drawn from.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Origin {
     /// Draws from its posterior, in this file.
     Posterior(PathBuf),

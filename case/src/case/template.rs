@@ -7,6 +7,7 @@ pub const TEMPLATE: &str = include_str!("template.toml");
 
 /// A case file that starts from data sheets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Template {
     /// A linear stage: a rated motor, an AT5 belt.
     Stage,

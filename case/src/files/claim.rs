@@ -42,6 +42,7 @@ struct Lock {
 
 /// Why a name could not be claimed.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Refusal {
     /// The error for the person who named it.
     pub error: Error,

@@ -24,6 +24,7 @@ pub struct Looked {
 
 /// A column of a file.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct FileColumn {
     /// By its name, or by its place where nothing names it.
     pub id: ColumnId,
@@ -35,6 +36,7 @@ pub struct FileColumn {
 
 /// Likely meaning of columns.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Guess {
     /// The recorder that made the file, where its columns are called as those of one.
     pub preset: Option<&'static str>,

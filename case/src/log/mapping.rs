@@ -25,6 +25,7 @@ const MOST_RUNS: usize = 1000;
 /// # Ok::<(), taut::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Mapping {
     /// The file: CSV, Parquet or MATLAB, told by its content.
     pub file: PathBuf,
@@ -61,6 +62,7 @@ pub struct Mapping {
 
 /// The column of a drive's input.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Fed {
     /// Its key in the table of a log: `input` of an axis.
     pub key: &'static str,
@@ -72,6 +74,7 @@ pub struct Fed {
 
 /// When samples were taken.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Clock {
     /// As a column says.
     Column(Source),
@@ -94,6 +97,7 @@ pub struct Source {
 
 /// The unit of a column.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Unit {
     /// By name: `mm`.
     Name(String),

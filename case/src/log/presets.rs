@@ -4,6 +4,7 @@
 
 /// A recorder whose files are known.
 #[derive(Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Preset {
     /// Its name in the case file.
     pub name: &'static str,
@@ -26,6 +27,7 @@ pub struct Preset {
 
 /// A line that ends the numbers of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct End {
     /// The line.
     pub line: &'static str,

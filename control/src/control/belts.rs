@@ -5,6 +5,7 @@ use crate::number::significant;
 
 /// The two sides that are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Sides {
     /// The spans at two drives with these names, from logs.
     Drives([&'static str; 2]),

@@ -10,6 +10,7 @@ const ROUNDING: f64 = 0.1;
 
 /// A peak of the first spectrum and the matching one of the second.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Pair {
     /// Frequency (Hz) and density in the first.
     pub first: (f64, f64),
@@ -26,6 +27,7 @@ impl Pair {
 
 /// The comparison of two spectra.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Comparison {
     /// 1 for equal shape, 0 for no common content: Σ ab / √(Σ a² Σ b²).
     pub similarity: f64,

@@ -16,6 +16,7 @@ const PARTS: [f64; 5] = [-1.0, -0.5, 0.0, 0.5, 1.0];
 
 /// The vibration that a shaper is chosen for.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub enum Target<'a> {
     /// Density over frequency; damping is not known.
     Spectrum(&'a Spectrum),

@@ -35,6 +35,7 @@ const PARTS: i32 = 30;
 
 /// A mode fitted to a spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct FittedMode {
     /// Undamped natural frequency, Hz.
     pub frequency: f64,

@@ -126,6 +126,7 @@ pub struct Model {
 
 /// The belts of a CoreXY from two spectra.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Diagonals {
     /// The statement, or the reason why there is none.
     pub stated: Result<Belts, String>,

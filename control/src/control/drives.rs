@@ -25,6 +25,7 @@ use std::f64::consts::PI;
 
 /// A gain of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct DriveGain {
     /// Whose.
     pub system: &'static str,

@@ -59,6 +59,7 @@ enum Part {
 /// N_y, N_x, N_i and D at one frequency, over poles of the controller of which [`Feedback::unstable`] are outside of
 /// the unit circle.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Terms {
     /// N_y, V/m or A/m.
     pub position: Complex<f64>,

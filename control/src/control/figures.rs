@@ -17,6 +17,7 @@ pub(super) fn is_made(profile: &Profile, window: f64, reached: f64) -> bool {
 
 /// A difference over time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Deviation {
     /// Its largest magnitude, with its sign, m.
     pub peak: Peak,
@@ -28,6 +29,7 @@ pub struct Deviation {
 
 /// Key figures of a move, by the role of the parts: peaks over all instants, not only rows, and integrals over time.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Figures {
     /// Figures of the slides: the cart of an axis, bridge and cart of a gantry.
     pub loads: Vec<LoadFigures>,
@@ -70,6 +72,7 @@ impl Figures {
 
 /// Key figures of a slide.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct LoadFigures {
     /// x − y: deviation from its reference.
     pub error: Deviation,
@@ -79,6 +82,7 @@ pub struct LoadFigures {
 
 /// Key figures of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct DriveFigures {
     /// r φ − y: deviation of its pulley from the reference of its part of the belt. A controller that compensates for
     /// the belt's elongation causes part of it on purpose.

@@ -7,6 +7,7 @@ pub const TOLERANCE: f64 = 0.05;
 
 /// Kind of shaper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum ShaperKind {
     /// Zero vibration.
     Zv,

@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector, RowDVector};
 /// ẋ = A x + B u + E w, with w a force on the cart; measured position and the cart's position and speed from x. SI
 /// units.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Linear {
     /// A.
     pub a: DMatrix<f64>,

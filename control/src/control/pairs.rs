@@ -23,6 +23,7 @@ const KEPT: usize = 3;
 
 /// Two shapers, convolved.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Pair {
     /// The shaper of the lower frequency first.
     pub parts: [Shaper; 2],

@@ -39,6 +39,7 @@ pub enum Source {
 
 /// A coordinate of a machine with several.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Coordinate {
     /// Its name.
     pub label: Label,
@@ -48,6 +49,7 @@ pub struct Coordinate {
 
 /// A file with its shapers.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct ShaperFile {
     /// The file.
     pub file: PathBuf,
@@ -67,6 +69,7 @@ pub struct ShaperFile {
 
 /// The shapers of each file, and the comparison of two spectra.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Findings {
     /// Result for each file.
     pub each: Vec<ShaperFile>,
@@ -109,6 +112,7 @@ pub struct Question {
 
 /// A damping ratio that is given, or fitted to the highest peak.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Damping {
     /// As given.
     Ratio(f64),
@@ -342,6 +346,7 @@ fn measured(args: &Question, files: &[PathBuf], file: &Path) -> Result<Source> {
 
 /// A mode of a model along the travel, and its worst remaining vibration.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Left {
     /// Its frequencies, without uncertainty.
     pub reach: Reach,

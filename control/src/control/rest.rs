@@ -2,6 +2,7 @@
 
 /// Amplitude of the command's oscillation after the profile.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Swing {
     /// In the first half of the rest, V or A.
     pub early: f64,

@@ -90,6 +90,7 @@ pub struct Loop {
 
 /// A stored sample of a controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Sample {
     /// s.
     pub time: f64,

@@ -42,6 +42,7 @@ impl Firmware {
 
 /// A kind with its parameters, in the notation of Klipper's configuration: `ei`, `mzv(n=4,t=0.9)`, `ei(v_tol=0.1)`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Form {
     /// With the usual parameters.
     Usual(ShaperKind),

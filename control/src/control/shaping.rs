@@ -13,6 +13,7 @@ use crate::quantity::rounded;
 
 /// A shaper at its best frequency.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Fitted {
     /// The shaper.
     pub shaper: Shaper,

@@ -15,6 +15,7 @@ const PROMINENCE: f64 = 0.1;
 
 /// An axis of the accelerometer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Axis {
     /// x.
     X,
@@ -39,6 +40,7 @@ impl Axis {
 /// A resonance test shakes more strongly at higher frequencies; divided by the frequency, the density represents better
 /// what a move excites. Klipper chooses shapers on this scale.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Spectrum {
     /// Hz, ascending, at most [`HIGHEST`].
     pub frequency: Vec<f64>,

@@ -23,6 +23,7 @@ pub fn spread(machine: &Machine, share: f64) -> Vec<(String, Machine)> {
 
 /// Worst case over varied axes.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Worst {
     /// Largest |x − y|, m; infinite if a run ends early.
     pub error: f64,

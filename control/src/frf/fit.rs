@@ -48,6 +48,7 @@ pub struct Known {
 
 /// Result of a fit, each number with the ends of its central 95 %.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct FrfFit {
     /// Factor on the stiffness of every span.
     pub stiffness: (f64, [f64; 2]),

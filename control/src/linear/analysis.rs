@@ -40,6 +40,7 @@ pub struct Question {
 
 /// Results of an analysis.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Analysis<'a> {
     /// The case of the machine.
     pub case: &'a Case,
@@ -67,6 +68,7 @@ pub struct Analysis<'a> {
 
 /// Results for one input.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct ByInput {
     /// The system of this input, with zero for the others.
     pub system: StateSpace,

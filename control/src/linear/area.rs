@@ -9,6 +9,7 @@ const PLACES: usize = 33;
 
 /// Undamped frequencies of the elastic modes over the working area.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ResonanceMap {
     /// Positions of the bridge, m.
     pub bridge: Vec<f64>,

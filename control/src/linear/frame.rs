@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// A quantity with its unit.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Variable {
     /// Its name, as of a column of a run.
     pub name: String,

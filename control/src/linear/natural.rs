@@ -21,6 +21,7 @@ const NOTHING: f64 = 1e-12;
 
 /// Rigid and elastic modes of a mechanism at one position.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Natural {
     /// The independent bodies, by their numbers; shapes are in their order.
     pub bodies: Vec<usize>,
@@ -34,6 +35,7 @@ pub struct Natural {
 
 /// A rigid mode: a motion without elongation.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct RigidMode {
     /// The chosen body, which it moves by one unit; other chosen bodies do not move.
     pub body: usize,
@@ -43,6 +45,7 @@ pub struct RigidMode {
 
 /// An elastic mode.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ElasticMode {
     /// Frequency without damping, rad/s.
     pub frequency: f64,

@@ -9,6 +9,7 @@ use std::f64::consts::PI;
 
 /// Frequency response of one output.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Response {
     /// Angular frequency, rad/s.
     pub frequency: Vec<f64>,
@@ -37,6 +38,7 @@ impl Response {
 
 /// The poles with the zeros and the gain of one output.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Transfer {
     /// Poles, 1/s.
     pub poles: Vec<Complex<f64>>,

@@ -13,6 +13,7 @@ const STILL: f64 = 0.98;
 
 /// Resonances at one position. All frequencies in Hz, the lowest first.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ResonancesAt {
     /// Position of the cart, m.
     pub position: f64,

@@ -13,6 +13,7 @@ const CANCELLED: f64 = 1e-11;
 
 /// The zeros of an output, and its gain.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Zeros {
     /// Zeros, at which the output stays zero although the state moves, rad/s (for a discrete-time system, 1);
     /// conjugates side by side.

@@ -11,6 +11,7 @@ const PAYS: f64 = 0.9;
 
 /// Feed-forward that improves the moves beyond the gains alone.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Ahead {
     /// The verdict on the gains with it.
     pub verdict: Verdict,

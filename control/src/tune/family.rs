@@ -56,6 +56,7 @@ impl Corner {
 
 /// A family of machines.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Family {
     /// The nominal machine.
     pub machine: Machine,

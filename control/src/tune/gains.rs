@@ -17,6 +17,7 @@ const WIDEST: f64 = 2.0;
 
 /// A gain.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Gain {
     /// Its key in the case file.
     pub key: &'static str,

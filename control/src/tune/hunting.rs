@@ -53,6 +53,7 @@ const WIDER: f64 = 0.1;
 
 /// An axis that does not come to rest.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Hunt {
     /// Amplitude of the cart's oscillation, m; NaN if no slip was observed.
     pub amplitude: f64,

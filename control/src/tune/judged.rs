@@ -10,6 +10,7 @@ use crate::design::Design;
 
 /// The verdict on a controller: on the nominal machine, and in the worst case over the family.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Verdict {
     /// The controller.
     pub design: Design,
@@ -122,6 +123,7 @@ impl Figure {
 
 /// The figure of all moves with the largest deterioration.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Worse {
     /// Index of the move; none for hunting.
     pub motion: Option<usize>,
@@ -139,6 +141,7 @@ pub struct Worse {
 /// The controller within the limits, among those judged on the complete family, whose worst figure deteriorates least:
 /// the least cost of the limits found by the search.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Least {
     /// It.
     pub design: Design,
@@ -169,6 +172,7 @@ impl Standing {
 
 /// The limit that forces gains worse than before.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Forced {
     /// The limit.
     pub limit: Limit,

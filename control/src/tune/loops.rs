@@ -247,6 +247,7 @@ pub(crate) fn smallest<const N: usize>(a: &Square<N>) -> f64 {
 
 /// The loops broken at one point, at one frequency.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct Broken {
     /// Where.
     pub at: Break,
@@ -261,6 +262,7 @@ pub struct Broken {
 /// The loops at one frequency: at each of [`breaks`], and from the reference of each slide to its position, without
 /// feed-forward.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Loops {
     /// In the order of [`breaks`].
     pub broken: Vec<Broken>,

@@ -44,6 +44,7 @@ const HIGH: f64 = 0.7;
 
 /// The break at which each margin is worst.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Breaks {
     /// Break of M_s.
     pub sensitivity: Break,
@@ -61,6 +62,7 @@ pub struct Breaks {
 
 /// Margins of a sampled loop, each at its worst break.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Margins {
     /// True if every pole of the closed loop lies within the unit circle, by Nyquist's criterion.
     pub stable: bool,
@@ -174,6 +176,7 @@ fn beyond(peaks: [f64; 2], limits: [f64; 2]) -> f64 {
 
 /// M_s and M_t of a loop, both infinite if it is unstable: the part of [`Margins`] that has limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Peaks {
     /// M_s and M_t.
     pub peaks: [f64; 2],
@@ -204,6 +207,7 @@ impl Peaks {
 
 /// A loop on the grid alone, in one pass: true peaks may be higher by some per cent.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Rough {
     /// M_s and M_t; infinite if it is unstable.
     pub peaks: Peaks,

@@ -42,6 +42,7 @@ pub(crate) const BALANCES: [Balance; 3] = [
 
 /// Figures of a move on one machine.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct MoveFigures {
     /// Largest |x − y| of all slides, m; infinite if the run ends early.
     pub error: f64,
@@ -122,6 +123,7 @@ fn figures_of(figures: &Figures, ending: Ending, motion: &Move) -> MoveFigures {
 
 /// Worst case of a move over several machines.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct AtWorst {
     /// E, m, and the index of its machine.
     pub error: (f64, usize),

@@ -3,6 +3,7 @@
 
 /// The result of a search.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Found {
     /// Where.
     pub x: Vec<f64>,

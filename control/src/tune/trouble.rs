@@ -30,6 +30,7 @@ const NEAR: f64 = 0.2;
 
 /// Kind of problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Kind {
     /// The sampled loop has poles outside the unit circle, or its oscillation grows.
     Unstable,
@@ -55,6 +56,7 @@ impl Kind {
 
 /// Problem of an unreliable move.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Trouble {
     /// The kind.
     pub kind: Kind,

@@ -11,6 +11,7 @@ use std::f64::consts::PI;
 
 /// Method by which gains of a structure are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum TunedBy {
     /// They follow from bandwidth and damping, where a search begins.
     Bandwidth,
@@ -68,6 +69,7 @@ pub trait Tunable {
 
 /// A gain in the form of industrial drives.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct InDrives {
     /// Name in manuals of drives.
     pub name: &'static str,

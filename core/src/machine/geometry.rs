@@ -4,6 +4,7 @@ use crate::mechanism::Label;
 
 /// The geometry of a kind of machine.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Geometry {
     /// Its name in the case file.
     pub word: &'static str,
@@ -23,6 +24,7 @@ pub struct Geometry {
 
 /// A drive.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct DriveAt {
     /// Its name.
     pub label: Label,
@@ -67,6 +69,7 @@ pub(super) use drive;
 
 /// A body.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct BodyAt {
     /// Its name.
     pub label: Label,
@@ -78,6 +81,7 @@ pub struct BodyAt {
 
 /// The part of a machine that a body is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Part {
     /// A pulley at a motor.
     DrivePulley,
@@ -91,6 +95,7 @@ pub enum Part {
 
 /// A span of the belt: a row of A.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct SpanAt {
     /// Its name.
     pub label: Label,
@@ -128,6 +133,7 @@ impl Lever {
 
 /// A slide: a coordinate of the machine.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct SlideAt {
     /// Its body.
     pub body: usize,

@@ -11,6 +11,7 @@ const MOST_TEETH: f64 = 12.0;
 
 /// A timing belt as its maker sells it.
 #[derive(Debug, PartialEq)]
+#[non_exhaustive]
 pub struct BeltType {
     /// Its name in the case file.
     pub name: &'static str,
@@ -28,6 +29,7 @@ pub struct BeltType {
 
 /// A belt of a certain width.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Width {
     /// Width b, m.
     pub width: f64,

@@ -5,6 +5,7 @@ use crate::friction::{Motion, Side};
 
 /// The equations in one mode: accelerations, rates of currents, and guards.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Equations {
     /// q̈ of each body.
     pub acceleration: [Form; BODIES],

@@ -5,6 +5,7 @@ use std::ops::{Add, Mul, Neg, Sub};
 
 /// A force, torque, current or rate as a linear form of the springs' lengths, speeds, currents, inputs, and one.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Form {
     /// Coefficients of the springs' lengths s = A q.
     pub stretch: [f64; SPRINGS],

@@ -16,6 +16,7 @@ const NOTHING: f64 = 1e-12;
 
 /// A spring's length that replaces a body's position.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Replaced {
     /// The body.
     pub body: usize,

@@ -62,6 +62,7 @@ pub struct Label {
 
 /// An inertia that turns or slides.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Body {
     /// Its name.
     pub label: Label,
@@ -113,6 +114,7 @@ impl MotionKind {
 
 /// Something between bodies that has a length: a span of the belt, a gear, an end stop.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Spring {
     /// Its name.
     pub label: Label,
@@ -181,6 +183,7 @@ impl SpringLaw {
 
 /// The argument of a force line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Over {
     /// The length of a spring.
     Length,
@@ -190,6 +193,7 @@ pub enum Over {
 
 /// A span whose length, and so its stiffness, changes with the positions of bodies: k = E A/(l + Σ a_j q_j).
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Follows {
     /// E A, N.
     pub rigidity: f64,
@@ -302,6 +306,7 @@ pub enum Shown {
 
 /// A column of a run.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Heading {
     /// Its name.
     pub name: Cow<'static, str>,
@@ -327,6 +332,7 @@ pub struct State {
 /// Roles of parts, by index: loads, drives and spans. Metrics use them, with keys and names from
 /// the labels.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct Roles {
     /// Loads: bodies that the machine is meant to move.
     pub loads: Vec<usize>,

@@ -5,6 +5,7 @@ use crate::friction::Motion;
 
 /// Mode: the state of each body, spring and drive, within which the equations are linear.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct Mode {
     /// Motion of each body.
     pub motion: [Motion; BODIES],
@@ -20,6 +21,7 @@ pub struct Mode {
 
 /// The states of the parts of a drive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct DriveMode {
     /// True if the torque through the gear is positive; matters only for a lossy gear.
     pub torque_positive: bool,
@@ -112,6 +114,7 @@ impl Limit {
 /// State of two elastic flanks. A flank only pushes: one that its damper delays carries no force, although it has not
 /// separated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[non_exhaustive]
 pub enum Contact {
     /// The negative side carries.
     Low,
@@ -139,6 +142,7 @@ impl Contact {
 
 /// Part of a mechanism, by index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum What {
     /// A body.
     Body(usize),
@@ -158,6 +162,7 @@ pub enum What {
 
 /// A part of a mechanism that changes between modes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub struct Part {
     /// Which.
     pub what: What,
@@ -191,6 +196,7 @@ impl Part {
 
 /// The state of a part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Status {
     /// State of a body.
     Motion(Motion),
@@ -254,6 +260,7 @@ impl PartialEq<Motion> for Status {
 
 /// A condition of a mode: the mode holds while `form` ≥ 0.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct Guard {
     /// The form that must not become negative.
     pub form: Form,

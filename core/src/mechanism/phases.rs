@@ -17,6 +17,7 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// A stepper's phases, prepared for evaluation.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Phases {
     /// N
     pub teeth: f64,
@@ -38,6 +39,7 @@ pub struct Phases {
 
 /// Rate of a phase current, A/s, with its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct PhaseRate {
     /// di/dt + R i/L, A/s.
     pub value: f64,
@@ -57,6 +59,7 @@ pub struct PhaseRate {
 /// For a voltage u = V/L, λ = R/L and κ = K_m/L; for a chopper within its supply u = ω_c √2 I, λ = ω_c and κ = 0.
 /// Detents count at rest, where the rotor is on a full step; at a speed their mean is zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Steady {
     /// Torque on the rotor, N m.
     pub torque: Form,

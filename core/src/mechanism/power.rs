@@ -4,6 +4,7 @@ use super::{AmplifierMode, BODIES, DRIVES, Limit, Mechanism, Mode, SPRINGS, Spri
 
 /// Power balance at one instant, W: `input` + `load` = losses + `stored`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Power {
     /// Electrical power at the motors' terminals, v i.
     pub input: f64,

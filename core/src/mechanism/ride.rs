@@ -23,6 +23,7 @@ use super::Mechanism;
 
 /// A cart that rides across on a bridge that yaws.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Ride {
     /// The body of the bridge, whose inertia includes the cart.
     pub bridge: usize,
@@ -36,6 +37,7 @@ pub struct Ride {
 
 /// Motion of a ride: what its forces depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Riding<T = f64> {
     /// y, m, and ẏ, m/s.
     pub cart: T,
@@ -69,6 +71,7 @@ impl<T> Riding<T> {
 
 /// A part of a ride that a force is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Ridden {
     /// m c on the bridge, N.
     Bridge,

@@ -7,6 +7,7 @@ use crate::friction::Motion;
 
 /// Transition of a guard that becomes negative.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Transition {
     /// The condition.
     pub cause: Cause,
@@ -46,6 +47,7 @@ pub enum Next {
 
 /// States that an event sets.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Resets {
     /// None.
     None,
@@ -66,6 +68,7 @@ pub enum StateQuantity {
 
 /// Tolerance for rounding after an event.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum After {
     /// Nothing.
     Nothing,

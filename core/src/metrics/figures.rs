@@ -51,6 +51,7 @@ impl Worth {
 
 /// A reason for a [`Meter`](super::Meter) to follow the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Seek {
     /// The peak speed of what slides.
     LoadSpeed,
@@ -92,6 +93,7 @@ impl Seek {
 
 /// The machines that have a figure, if not all have it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Only {
     /// Those with a single drive.
     OneDrive,
@@ -119,6 +121,7 @@ impl Extras {
 
 /// A row of the list: a figure of each part of a role.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct FigureRow {
     /// The role of the parts that have it.
     pub role: Role,

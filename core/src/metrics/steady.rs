@@ -19,6 +19,7 @@ const NEGLIGIBLE: f64 = 1e-7;
 
 /// Cart speed at the end of the last interval of at least a fiftieth of the run with a constant input other than zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct SteadySpeed {
     /// Speed at the end of that interval, m/s.
     pub value: f64,

@@ -65,6 +65,7 @@ impl Accessor {
 
 /// Naming of the elements of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum List {
     /// It is a single number.
     None,

@@ -7,6 +7,7 @@ use crate::machine::Machine;
 
 /// Location of a row's number in a machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Sits {
     /// Nowhere.
     Elsewhere,

@@ -52,6 +52,7 @@ pub struct Parameter {
 
 /// Location of a number in a structure, and its role in a search.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct InStructure {
     /// Its value; none in a structure without it.
     pub get: fn(&Structure) -> Option<f64>,
@@ -74,6 +75,7 @@ pub enum Tuned {
 
 /// Variation of a parameter by `--spread` without being named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Off {
     /// Not varied: it is counted, chosen or set.
     No,
@@ -135,6 +137,7 @@ impl Sum {
 
 /// The weight of a number in a sum at the drive pulley.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Arm {
     /// Factor 1.
     One,

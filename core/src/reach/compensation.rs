@@ -44,6 +44,7 @@ pub struct Compensation {
 /// Motion of the pulleys for which the cart follows its reference, y₁ = r φ₁ and y₃ = r φ₃, and the required motor
 /// force at the belt.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Needed<N = f64> {
     /// Drive pulley.
     pub drive: Reference<N>,

@@ -19,6 +19,7 @@ const TAUT: f64 = 1.0 - 1e-6;
 
 /// A limit that a reference exceeds.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Shortfall {
     /// `voltage`, `current`, `pull_out`, `breakaway`, `travel`, `slack`, `tension` or `teeth`.
     pub limit: &'static str,
@@ -80,6 +81,7 @@ impl Demand {
 
 /// Largest requirement of a reference, and its limit, both in `unit`.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Load {
     /// `voltage`, `current`, `pull_out`, `slack`, `tension` or `teeth`.
     pub limit: &'static str,

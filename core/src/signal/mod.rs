@@ -89,6 +89,7 @@ impl Signal {
 ///
 /// Before time zero and outside its own extent a signal is zero, but for ramps and tables, which hold their last value.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Signal {
     /// `value` from `at` on.
     Step {

@@ -6,6 +6,7 @@ use crate::machine::Machine;
 
 /// The name of a solver.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum SolverKind {
     /// [`Solver::Exact`]
     Exact,

@@ -15,6 +15,7 @@ pub struct Begun {
 
 /// A variable of differentiation.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub enum Variable {
     /// A number of the machine, or of its start. Derivatives of the equations are differences: w₀ · those of the run's
     /// own machine + w₁ · those of the first one here + w₂ · those of the second.
@@ -47,6 +48,7 @@ impl Variable {
 
 /// The quantity that is differentiated.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Differentiated {
     /// A column of the run: position, speed, elongation, force, current, voltage or input.
     Shown(Shown),
@@ -56,6 +58,7 @@ pub enum Differentiated {
 
 /// Derivatives of each output with respect to each variable, row by row.
 #[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Sensitivities {
     /// The outputs themselves.
     pub values: Vec<Vec<f64>>,

@@ -154,6 +154,7 @@ impl Event {
 /// A decision within rounding: a body at rest whose load equals its breakaway, or a body that rounding reverses
 /// repeatedly. Parameters that differ in their last bit may lead to the other decision.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Tie {
     /// Time, s.
     pub time: f64,
@@ -334,6 +335,7 @@ pub enum Flow {
 
 /// Columns of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Detail {
     /// All of them.
     #[default]

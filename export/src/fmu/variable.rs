@@ -5,6 +5,7 @@ use crate::solve::Quantity;
 
 /// A variable of a machine.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Variable {
     /// Its number for importers.
     pub reference: u32,

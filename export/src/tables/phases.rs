@@ -30,6 +30,7 @@ const LIMITS: [Limit; 3] = [Limit::Low, Limit::Inside, Limit::High];
 
 /// A stepper of a machine in tables.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Stepped {
     /// The body that its rotor turns.
     pub shaft: usize,

@@ -14,6 +14,7 @@ use crate::solve::Flow;
 
 /// The result of a check before a fit.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Check {
     /// The survey of each log.
     pub logs: Vec<Survey>,

@@ -97,6 +97,7 @@ pub struct Channel {
 
 /// A sample that stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Outlier {
     /// Which sample, from 0.
     pub sample: usize,
@@ -122,6 +123,7 @@ pub struct Jump {
 /// A value that is repeated although the motion goes on, and the next value has caught up with it; or although noise
 /// would change it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Held {
     /// The first repeated sample, from 0.
     pub sample: usize,
@@ -145,6 +147,7 @@ impl Held {
 
 /// A run of equal values at an extreme.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Clipped {
     /// The extreme value.
     pub value: f64,

@@ -22,6 +22,7 @@ use std::fmt;
 
 /// The survey of a log.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Survey {
     /// The log's name.
     pub log: String,
@@ -52,6 +53,7 @@ pub struct Note {
 
 /// How much something matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Severity {
     /// Good to know.
     Fact,

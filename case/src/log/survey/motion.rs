@@ -73,6 +73,7 @@ pub struct Motion {
 
 /// A stretch of steady speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Steady {
     /// Where it begins, s.
     pub from: f64,

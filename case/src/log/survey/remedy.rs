@@ -5,6 +5,7 @@ use crate::log::{Log, Quantity};
 
 /// A change of a log with which a suspicion would be gone.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Remedy {
     /// Another sign of what went in.
     Reverse,

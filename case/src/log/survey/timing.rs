@@ -11,6 +11,7 @@ const SAME: f64 = 1e-6;
 
 /// The clock of a log.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Timing {
     /// How many samples there are.
     pub samples: usize,
@@ -30,6 +31,7 @@ pub struct Timing {
 
 /// A stretch without samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Gap {
     /// Time of the sample before it, s.
     pub at: f64,

@@ -47,6 +47,7 @@ const STEPS: usize = 12;
 
 /// A guarantee on a loop over a box of machines.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Certificate {
     /// Certified part of the half-widths of the family: 1 for the whole family, 0 if nothing is certified.
     pub factor: f64,
@@ -60,6 +61,7 @@ pub struct Certificate {
 
 /// A machine that violates a limit.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Violation {
     /// Its largest deviation relative to the half-widths of the family.
     pub factor: f64,

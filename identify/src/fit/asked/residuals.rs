@@ -49,6 +49,7 @@ pub trait Residuals {
 /// Step sizes of finite differences. The step is the cube root of the rounding unit for central differences, which
 /// balances the errors of formula and rounding (1e-10 of the value), and the square root for one-sided ones.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Differences {
     /// One-sided, from the values at hand.
     Forward,

@@ -16,6 +16,7 @@ use std::sync::Arc;
 
 /// A nuisance of a log: fitted along, one for each log.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Nuisance {
     /// The input acts this much later, s.
     Delay,
@@ -81,6 +82,7 @@ impl Nuisance {
 
 /// A nuisance of a run, and how it is searched.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Extra {
     /// Which.
     pub what: Nuisance,
@@ -98,6 +100,7 @@ pub struct Extra {
 
 /// One output of a log with its weights.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct MeasuredOutput {
     /// The quantity.
     pub quantity: Quantity,

@@ -23,6 +23,7 @@ use crate::solve::Flow;
 
 /// The effect of single changes on the errors of a machine.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Drift {
     /// Errors of the unchanged machine.
     pub unchanged: Vec<Together>,
@@ -37,6 +38,7 @@ pub struct Drift {
 
 /// A single change.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Change {
     /// The parameter, with its old and its new value.
     pub estimate: Estimate,

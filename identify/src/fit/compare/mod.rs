@@ -55,6 +55,7 @@ impl ComparisonOptions {
 
 /// Result of a comparison.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Comparison {
     /// All candidates, the best prediction first.
     pub candidates: Vec<Candidate>,
@@ -80,6 +81,7 @@ pub struct Comparison {
 
 /// A law with a length of windows.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Candidate {
     /// The law.
     pub law: FrictionLaw,

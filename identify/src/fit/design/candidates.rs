@@ -6,6 +6,7 @@ use std::f64::consts::PI;
 
 /// A kind of input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Excitation {
     /// Trapezoids there and back, every second one smaller.
     Trapezoid,

@@ -10,6 +10,7 @@ use crate::solve::{Bench, Detail, Ending, Flow};
 
 /// Origin of a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Origin {
     /// The request.
     Asked,
@@ -47,6 +48,7 @@ pub struct Limits {
 
 /// Extremes of an experiment.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct Reached {
     /// Greatest input, V or A.
     pub input: f64,

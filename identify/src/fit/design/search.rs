@@ -22,6 +22,7 @@ use rand_pcg::rand_core::SeedableRng;
 
 /// Predicted accuracy of a parameter.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Promise {
     /// Its name.
     pub name: String,
@@ -48,6 +49,7 @@ impl Promise {
 
 /// The best input of a kind.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Alternative {
     /// The input.
     pub shape: Shape,
@@ -61,6 +63,7 @@ pub struct Alternative {
 
 /// An experiment of the case with the same measurement.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Own {
     /// Its name.
     pub name: String,
@@ -74,6 +77,7 @@ pub struct Own {
 
 /// The designed experiment.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Designed {
     /// The input.
     pub shape: Shape,

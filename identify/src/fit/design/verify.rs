@@ -16,6 +16,7 @@ use rand_pcg::rand_core::SeedableRng;
 
 /// Findings of the fits of simulated logs for a parameter.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Verified {
     /// Its name.
     pub name: String,

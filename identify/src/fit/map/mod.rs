@@ -35,6 +35,7 @@ use waves::{Noise, Wave, search};
 
 /// A force along the travel.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct ForceMap {
     /// The points, in order; values in addition to those of the case.
     pub points: Vec<Point>,
@@ -64,6 +65,7 @@ pub struct ForceMap {
 
 /// A point of a map.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Point {
     /// m
     pub position: f64,
@@ -77,6 +79,7 @@ pub struct Point {
 
 /// A periodic component.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Component {
     /// Period and its standard error, m.
     pub period: [f64; 2],
@@ -90,6 +93,7 @@ pub struct Component {
 
 /// Source of a period along the travel.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Origin {
     /// Number of periods per turn of the pulleys, which have one radius: 1 for an eccentric pulley.
     Pulley {

@@ -49,6 +49,7 @@ pub(super) struct Slow {
 
 /// An error that repeats with position.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Wave {
     /// The quantity with the error.
     pub quantity: Quantity,

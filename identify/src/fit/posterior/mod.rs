@@ -29,6 +29,7 @@ use rand_pcg::rand_core::SeedableRng;
 
 /// Draws with diagnostics.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Posterior {
     /// The variables: parameters, nuisances that all logs share, then those of each log.
     pub variables: Vec<Credible>,
@@ -44,6 +45,7 @@ pub struct Posterior {
 
 /// The posterior of one number.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Credible {
     /// Its name, preceded by that of its log if it belongs to one.
     pub name: String,

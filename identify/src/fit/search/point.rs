@@ -68,6 +68,7 @@ impl Ending {
 
 /// A strategy of a search.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub enum Strategy {
     /// Damped steps by the derivatives at the point.
     Damped,
@@ -79,6 +80,7 @@ pub enum Strategy {
 
 /// Result of a search.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Minimum {
     /// The variables.
     pub x: Vec<f64>,

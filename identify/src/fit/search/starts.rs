@@ -26,6 +26,7 @@ use std::sync::Arc;
 
 /// The effort of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub struct Work {
     /// Jacobians.
     pub iterations: usize,

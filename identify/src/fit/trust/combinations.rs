@@ -7,6 +7,7 @@ use nalgebra::{DMatrix, DVector};
 
 /// A combination of parameters that the logs determine.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Combination {
     /// In symbols of the keys: `cart.friction.viscous / amplifier.gain`.
     pub name: String,

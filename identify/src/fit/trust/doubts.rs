@@ -63,6 +63,7 @@ pub struct Cause {
 
 /// A value with its standard error.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Size {
     /// The parameter.
     pub name: String,

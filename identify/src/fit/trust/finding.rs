@@ -2,6 +2,7 @@
 
 /// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[non_exhaustive]
 pub enum Grade {
     /// Information.
     Note,
@@ -21,6 +22,7 @@ impl Grade {
 
 /// A finding.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Finding {
     /// Its severity.
     pub grade: Grade,

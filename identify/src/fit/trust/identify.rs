@@ -17,6 +17,7 @@ use nalgebra::DMatrix;
 
 /// The information of the logs on the parameters.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Identifiability {
     /// Names of the free parameters, those of the machine first, then what is shared.
     pub names: Vec<String>,
@@ -37,6 +38,7 @@ pub struct Identifiability {
 
 /// Parameters that the logs cannot distinguish.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Group {
     /// Indices among the names.
     pub members: Vec<usize>,

@@ -18,6 +18,7 @@ use crate::solve::Flow;
 
 /// The profile of one parameter.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Profile {
     /// The parameter.
     pub name: String,

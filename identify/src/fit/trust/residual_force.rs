@@ -19,6 +19,7 @@ use crate::parameter::{Sum, at_pulley, value};
 
 /// Residual force along a log.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct ResidualForce {
     /// s.
     pub time: Vec<f64>,

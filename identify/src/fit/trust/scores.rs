@@ -131,6 +131,7 @@ fn score(seen: &[f64], model: &[f64], rows: std::ops::Range<usize>) -> Option<Sc
 
 /// Agreement with several logs together.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Together {
     /// The name that they share; empty for all logs.
     pub name: String,

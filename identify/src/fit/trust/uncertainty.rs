@@ -17,6 +17,7 @@ use std::f64::consts::TAU;
 
 /// Covariance of the free variables, in their order; exists only if they are determined.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Covariance {
     /// Variables that are free.
     pub free: Vec<usize>,
