@@ -187,6 +187,36 @@ fn a_folder_has_rows_summary_case_report_and_plots() {
     assert_eq!(again, summary);
 }
 
+/// Counted from the rows, of an experiment and of moves: one that keeps its steps and one that loses them.
+#[test]
+fn the_probability_of_lost_steps_is_told() {
+    let folder = TempDir::new().unwrap();
+    let case = machine("../stepper-axis/stepper-axis.toml");
+    let (torque, mass) = ("stepper.holding_torque=40%", "cart.mass=40%");
+    let text = done(folder.path(), &[&case, "--runs", "6", "--vary", torque, "--vary", mass, "--out", "out"]);
+    let out = folder.path().join("out");
+    let summary: Value = serde_json::from_str(&fs::read_to_string(out.join("sweep.json")).unwrap()).unwrap();
+    let mut seen = Vec::new();
+    for group in summary["experiments"].as_array().unwrap() {
+        let file = taut::plan::file_name(group["name"].as_str().unwrap());
+        let names = ["in_step", "lost_steps"].map(|name| format!("{file}.{name}"));
+        let columns = read_columns(&out.join("runs.parquet"), &names.each_ref().map(String::as_str)).unwrap();
+        let slipped = columns[0].iter().filter(|value| **value == 0.0).count();
+        let lost = &group["lost_steps"];
+        assert_eq!([&lost["runs"], &lost["of"]].map(Value::as_u64), [Some(slipped as u64), Some(6)], "{group}");
+        let ends = [0, 1].map(|k| lost["interval_95"][k].as_f64().unwrap());
+        assert!(ends[0] <= slipped as f64 / 6.0 && slipped as f64 / 6.0 <= ends[1], "{group}");
+        assert!(text.contains(&format!("steps are lost in {slipped} of 6 runs")), "{text}");
+        // Steps in which a run ends behind were lost.
+        assert!(columns[1].iter().filter(|steps| **steps != 0.0).count() <= slipped);
+        seen.push(slipped);
+    }
+    assert!(seen.iter().any(|slipped| *slipped > 0) && seen.contains(&0), "{seen:?}");
+    let plain = machine("table4.toml");
+    let text = done(folder.path(), &[&plain, "--runs", "2", "--vary", "cart.mass=20%"]);
+    assert!(!text.contains("steps are lost"), "{text}");
+}
+
 #[test]
 fn trajectories_are_written_on_request() {
     let folder = TempDir::new().unwrap();

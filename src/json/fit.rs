@@ -158,7 +158,7 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
         "variables": fit.variables,
         "parameters": parameters,
         "not_determined": not_determined,
-        "belts": fit.belts().map(belts),
+        "belts": fit.belts().as_ref().map(belts),
         "disagreement": fit.disagreement.as_ref().map(|found| json!({
             "windows": found.windows,
             "length_s": number(found.length),

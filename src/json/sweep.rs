@@ -42,6 +42,9 @@ fn of_group(summary: &Summary, group: &Shown) -> Value {
     json!({
         "name": group.name,
         "endings": endings,
+        "lost_steps": group.lost_steps().map(|lost| {
+            json!({ "runs": lost.lost, "of": lost.runs, "share": lost.share(), "interval_95": lost.interval })
+        }),
         "figures": group.measures.iter().map(|measured| figure(summary, measured)).collect::<Vec<_>>(),
     })
 }

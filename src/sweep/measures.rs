@@ -56,6 +56,9 @@ enum Per {
     Whole,
     /// The whole of a machine whose cart moves in a plane.
     Plane,
+    /// A drive with a stepper, and a machine with steppers.
+    Stepper,
+    Steppers,
 }
 
 /// A figure of moves: its name and words on an axis, and those of each part of a machine with several, `*` being the
@@ -78,6 +81,9 @@ const fn row(
     Row { names, unit, words, per, of }
 }
 
+/// Name of the figure that is 1 if no step is lost, and 0 otherwise.
+pub(super) const IN_STEP: &str = "in_step";
+
 /// Those of a move in closed loop, in the order of the columns.
 #[rustfmt::skip]
 const OF_MOVE: &[Row] = &[
@@ -96,11 +102,13 @@ const OF_MOVE: &[Row] = &[
     row(["limited_time", "*_limited_time"], "s", ["time at the controller's limit", "time of the * at the controller's limit"], Per::Drive, |m, k| m.figures.drives[k].limited),
     row(["energy_taken", "*_energy_taken"], "J", ["electrical energy taken in", "electrical energy that the * takes in"], Per::Drive, |m, k| m.figures.drives[k].energy.0),
     row(["restlessness", "*_restlessness"], "Hz", ["changes of direction of the command per second", "changes of direction of the command of the * per second"], Per::Drive, |m, k| m.figures.drives[k].restlessness),
+    row(["lost_steps", "*_lost_steps"], "", ["full steps lost at the end", "full steps lost by the * at the end"], Per::Stepper, |m, k| m.metrics.drives[k].lost_steps.map_or(f64::NAN, |own| own.at_end as f64)),
+    row([IN_STEP; 2], "", ["in step all the way"; 2], Per::Steppers, |m, _| f64::from(u8::from(m.metrics.in_step()))),
     row(["peak_belt_force"; 2], "N", ["largest force in the belt"; 2], Per::Whole, |m, _| m.metrics.largest_force().1.value.abs()),
 ];
 
-/// The figures of moves of a kind of machine.
-pub fn of_move(kind: MachineKind) -> Vec<Measure> {
+/// The figures of moves of a kind of machine, with or without steppers.
+pub fn of_move(kind: MachineKind, has_steppers: bool) -> Vec<Measure> {
     let geometry = kind.geometry();
     let loads: Vec<Label> = geometry.slides.iter().map(|slide| geometry.label(slide.body)).collect();
     let side = |drive: &DriveAt| Label { key: geometry.drive_key(drive), name: drive.label.name };
@@ -117,8 +125,11 @@ pub fn of_move(kind: MachineKind) -> Vec<Measure> {
         let parts = match per {
             Per::Load => &loads,
             Per::Drive => &drives,
+            Per::Stepper if has_steppers => &drives,
+            Per::Stepper => return Vec::new(),
+            Per::Steppers if !has_steppers => return Vec::new(),
             Per::Plane if loads.len() < 2 => return Vec::new(),
-            Per::Whole | Per::Plane => return vec![one(0, Label { key: "", name: "" }, 0)],
+            Per::Whole | Per::Plane | Per::Steppers => return vec![one(0, Label { key: "", name: "" }, 0)],
         };
         let place = usize::from(parts.len() > 1);
         parts.iter().enumerate().map(|(part, label)| one(part, *label, place)).collect()

@@ -40,7 +40,7 @@ pub use measures::{Figure, Measure, of_move};
 pub use sobol::{DIMENSIONS, Sobol};
 pub use statistics::{Ranked, SHARES, Spread};
 use subject::{Subject, Worker};
-pub use summary::{Drawn, Measured, Shown, Summary};
+pub use summary::{Drawn, LostShare, Measured, Shown, Summary};
 
 use crate::case::Sampling;
 use crate::error::Result;

@@ -39,7 +39,7 @@ impl Subject {
         let (machine, moves, controller) = (case.machine.clone(), case.moves.clone(), case.controller.clone());
         let mut of_experiment = metrics::figures(machine.kind, Extras::new(&machine));
         of_experiment.retain(|figure| !(case.is_axis() && figure.row.again_on_an_axis) && plan.tells(&figure.name));
-        let mut of_move = measures::of_move(machine.kind);
+        let mut of_move = measures::of_move(machine.kind, machine.stepper().is_some());
         of_move.retain(|measure| plan.tells(&measure.name));
         let seeks: Vec<_> = of_experiment.iter().filter_map(metrics::Figure::seek).collect();
         let sought = Sought::new(&machine, &machine.mechanism(), &seeks);

@@ -1,6 +1,9 @@
 //! The summary of all runs of a sweep: how each figure is spread, and which parameters it depends on.
 
+use super::measures::IN_STEP;
 use super::{Index, Spread, Status};
+use crate::chance::normal_quantile;
+use crate::number::significant;
 
 /// The whole summary.
 #[derive(Debug, Clone)]
@@ -35,6 +38,52 @@ pub struct Shown {
     pub endings: Vec<(Status, usize)>,
     /// Its figures.
     pub measures: Vec<Measured>,
+}
+
+/// How often steppers lose steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct LostShare {
+    /// Runs out of step, and runs in all.
+    pub lost: usize,
+    /// All runs.
+    pub runs: usize,
+    /// Probability of lost steps: its 95 % interval by Wilson (1927).
+    pub interval: [f64; 2],
+}
+
+impl LostShare {
+    fn new(lost: usize, runs: usize) -> Self {
+        let (n, z) = (runs as f64, normal_quantile(0.975));
+        let share = lost as f64 / n;
+        // (p + z²/2n ± z √(p (1 − p)/n + z²/4n²))/(1 + z²/n)
+        let middle = share + z * z / (2.0 * n);
+        let half = z * (share * (1.0 - share) / n + z * z / (4.0 * n * n)).sqrt();
+        let at = |value: f64| (value / (1.0 + z * z / n)).clamp(0.0, 1.0);
+        Self { lost, runs, interval: [at(middle - half), at(middle + half)] }
+    }
+
+    /// Share of the runs out of step.
+    pub fn share(&self) -> f64 {
+        self.lost as f64 / self.runs as f64
+    }
+
+    /// In a sentence.
+    pub fn words(&self) -> String {
+        let percent = |share: f64| significant(100.0 * share, 2);
+        let [low, high] = self.interval.map(percent);
+        let (lost, runs, share) = (self.lost, self.runs, percent(self.share()));
+        format!("steps are lost in {lost} of {runs} runs: {share} % (95 %: {low} to {high} %)")
+    }
+}
+
+impl Shown {
+    /// How often steps are lost; none of other motors, or if the figure `in_step` is not kept.
+    pub fn lost_steps(&self) -> Option<LostShare> {
+        let in_step = self.measures.iter().find(|measured| measured.name == IN_STEP)?.spread.as_ref()?;
+        let kept = (in_step.mean * in_step.count as f64).round() as usize;
+        Some(LostShare::new(in_step.count - kept.min(in_step.count), in_step.count))
+    }
 }
 
 /// One figure of one experiment.
@@ -103,5 +152,25 @@ impl Measured {
     pub fn chance(&self) -> f64 {
         let count = self.spread.as_ref().map_or(0, |spread| spread.count);
         3.29 / (count.max(2) as f64 - 1.0).sqrt()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::LostShare;
+
+    /// The examples of Newcombe (1998), table I.
+    #[test]
+    fn intervals_of_wilson() {
+        for (lost, runs, [low, high]) in [
+            (81, 263, [0.2553, 0.3662]),
+            (15, 148, [0.0624, 0.1605]),
+            (0, 20, [0.0, 0.1611]),
+            (1, 29, [0.0061, 0.1718]),
+        ] {
+            let share = LostShare::new(lost, runs);
+            let [a, b] = share.interval;
+            assert!((a - low).abs() < 1e-4 && (b - high).abs() < 1e-4, "{share:?}");
+        }
     }
 }

@@ -58,13 +58,16 @@ impl Case {
     /// own.
     pub fn moves_named(&self, path: &Path, names: &[String]) -> Result<(&Design, Vec<&Move>)> {
         let Some(design) = self.controller.as_ref().filter(|_| !self.moves.is_empty()) else {
+            let to = match self.machine.geometry().slides.len() {
+                1 => "to = \"20 mm\"",
+                _ => "to = [\"20 mm\", \"0 mm\"]",
+            };
+            let motion = format!("[[move]] with name, {to}, speed, acceleration and until");
             if self.machine.stepper().is_some() || self.controller.is_some() {
-                return Err(Error::new("this case has no move")
-                    .in_file(path)
-                    .next("add [[move]] with name, to, speed, acceleration and until"));
+                return Err(Error::new("this case has no move").in_file(path).next(format!("add {motion}")));
             }
             return Err(Error::new("this case has no move and no controller to run it").in_file(path).next(format!(
-                "add [controller] with for example {}, and [[move]] with name, to, speed, acceleration and until",
+                "add [controller] with for example {}, and {motion}",
                 suggestion::controller(&self.machine)
             )));
         };

@@ -34,7 +34,10 @@ pub(super) fn tables(root: &Table, kind: MachineKind) -> Result<Vec<&'static str
     }
     if let Some(field) = root.optional("stepper").filter(|_| kind.geometry().drives.len() > STEPPERS) {
         return Err(field
-            .fail(format!("a gantry of kind \"{}\" has three motors, and only two can be steppers", kind.word()))
+            .fail(format!(
+                "a gantry of kind \"{}\" has three motors; steppers are available for machines with one or two",
+                kind.word()
+            ))
             .next("describe [motor] and [amplifier] instead, or a gantry with two motors"));
     }
     let drives = kind.geometry().drives.iter().map(|drive| drive.label.key);

@@ -65,7 +65,7 @@ pub(super) fn drive(root: &Table) -> Result<Option<DriveUnit>> {
         && let Some(field) = table.optional("detent_torque")
     {
         return Err(field
-            .fail("such a detent torque is stronger than the field between its steps")
+            .fail("with such a detent torque the motor also comes to rest between the commanded steps")
             .allowed(format!("below a quarter of the holding torque, {}", show(0.25 * torque, "N m"))));
     }
     let supply = table.number("supply")?;

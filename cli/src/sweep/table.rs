@@ -19,6 +19,9 @@ pub fn text(work: &Work, summary: &Summary, took: Duration, run: u64) -> String 
         if let Some(endings) = endings(group) {
             let _ = writeln!(text, "  {endings}");
         }
+        if let Some(lost) = group.lost_steps() {
+            let _ = writeln!(text, "  {}", lost.words());
+        }
         let mut rows =
             vec![["".to_string(), "5 %".into(), "50 %".into(), "95 %".into(), influence_heading(work.sweep).into()]];
         // Counts of events are for the report.

@@ -9,8 +9,15 @@ use crate::signal::profile::{Passage, Profile};
 use crate::solve::{Curve, Polynomial, TERMS};
 use std::f64::consts::TAU;
 
-/// Maximum number of earlier legs that may be the nearest, since the slides lag their references.
-const LEGS_BEHIND: usize = 16;
+/// Along the path, the nearest point of a slide is at most this many times its distance from the path away from the one
+/// before, beside its own way: on both sides of a sharp corner that is cut.
+const CUT: f64 = 4.0;
+
+/// The same for its way, and for its distance from the reference.
+const WAY: f64 = 2.0;
+
+/// The same, least, m.
+const LEAST: f64 = 1e-9;
 
 /// The path that two profiles on one clock describe, leg by leg.
 #[derive(Debug, Clone)]
@@ -25,6 +32,9 @@ pub(super) struct Contour {
 struct Course {
     /// s
     begin: f64,
+    /// Length of the path up to it, and its own, m.
+    before: f64,
+    length: f64,
     /// m
     from: [f64; 2],
     to: [f64; 2],
@@ -50,47 +60,89 @@ impl Course {
         // The centre is to the left of a counterclockwise arc.
         (angle * turn.radius / turn.length, sense * (turn.radius - off[0].hypot(off[1])))
     }
+
+    /// The point at this fraction of the leg, m.
+    fn at(&self, share: f64) -> [f64; 2] {
+        match &self.arc {
+            None => std::array::from_fn(|k| self.from[k] + share * (self.to[k] - self.from[k])),
+            Some((turn, center)) => {
+                let angle = turn.phase + turn.per_length * share * turn.length;
+                [turn.center + turn.radius * angle.cos(), center + turn.radius * angle.sin()]
+            }
+        }
+    }
+
+    /// Nearest point of the part of the leg between two fractions.
+    fn nearest(&self, point: [f64; 2], [least, most]: [f64; 2]) -> Foot {
+        let (share, left) = self.beside(point);
+        let is_beside = (least..=most).contains(&share);
+        let far = |share: f64| {
+            let end = self.at(share);
+            (point[0] - end[0]).hypot(point[1] - end[1])
+        };
+        let (share, distance) = match is_beside {
+            true => (share, left),
+            false if far(least) < far(most) => (least, far(least).copysign(left)),
+            false => (most, far(most).copysign(left)),
+        };
+        Foot { distance, along: self.before + share * self.length, leg: None, is_beside }
+    }
+}
+
+/// The point of a path nearest to another one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Foot {
+    /// Distance of the other point, m, positive to the left.
+    pub distance: f64,
+    /// Length of the path up to it, m.
+    along: f64,
+    /// Index of its leg, if there is one.
+    leg: Option<usize>,
+    /// True if it is no end of the part of the leg that may be the nearest.
+    is_beside: bool,
 }
 
 impl Contour {
     /// Path of two profiles, without their shapers; none for another number of profiles.
     pub fn along(profiles: &[Profile]) -> Option<Self> {
         let [x, y] = profiles else { return None };
-        let leg = |(x, y): (&Passage, &Passage)| Course {
-            begin: x.begin,
-            from: [x.from, y.from],
-            to: [x.to, y.to],
-            arc: x.turn.zip(y.turn.map(|turn| turn.center)),
+        let mut before = 0.0;
+        let leg = |(x, y): (&Passage, &Passage)| {
+            let (from, to) = ([x.from, y.from], [x.to, y.to]);
+            let arc = x.turn.zip(y.turn.map(|turn| turn.center));
+            let length = arc.map_or((to[0] - from[0]).hypot(to[1] - from[1]), |(turn, _)| turn.length);
+            let course = Course { begin: x.begin, before, length, from, to, arc };
+            before += length;
+            course
         };
         let legs = x.passages().iter().zip(y.passages()).map(leg);
         let legs = legs.filter(|leg| leg.arc.is_some() || leg.from != leg.to).collect();
         Some(Self { legs, start: [x.start(), y.start()] })
     }
 
-    /// Distance of a point from the path at `time`, s, positive to the left; the index of the nearest leg, and true if
-    /// its nearest point is not an end.
-    pub fn nearest(&self, time: f64, point: [f64; 2]) -> (f64, Option<usize>, bool) {
+    /// Nearest point of the path at `time`, s, between two lengths along it, m.
+    fn nearest(&self, time: f64, point: [f64; 2], [least, most]: [f64; 2]) -> Foot {
+        // None is reached before its time, but that of the next leg at its corner.
         let now = self.legs.partition_point(|leg| leg.begin <= time);
-        let legs = now.saturating_sub(LEGS_BEHIND)..(now + 1).min(self.legs.len());
-        let mut best = (f64::INFINITY, None, false);
-        for number in legs {
-            let leg = &self.legs[number];
-            let (share, left) = leg.beside(point);
-            let is_beside = (0.0..=1.0).contains(&share);
-            let far = |end: [f64; 2]| (point[0] - end[0]).hypot(point[1] - end[1]);
-            let distance = match (is_beside, &leg.arc) {
-                (true, _) => left,
-                (false, None) => far(if share > 1.0 { leg.to } else { leg.from }).copysign(left),
-                (false, Some(_)) => far(leg.to).min(far(leg.from)).copysign(left),
-            };
-            if distance.abs() < best.0.abs() {
-                best = (distance, Some(number), is_beside);
+        let first = self.legs.partition_point(|leg| leg.before + leg.length < least);
+        let last = self.legs.partition_point(|leg| leg.before <= most).min(now + 1).min(self.legs.len());
+        let mut best: Option<Foot> = None;
+        for (number, leg) in self.legs.iter().enumerate().take(last).skip(first.min(last.saturating_sub(1))) {
+            let share = |along: f64| ((along - leg.before) / leg.length).clamp(0.0, 1.0);
+            let foot = Foot { leg: Some(number), ..leg.nearest(point, [share(least), share(most)]) };
+            if best.is_none_or(|best| foot.distance.abs() < best.distance.abs()) {
+                best = Some(foot);
             }
         }
-        match best {
-            (_, None, _) => ((point[0] - self.start[0]).hypot(point[1] - self.start[1]), None, false),
-            best => best,
-        }
+        let off = (point[0] - self.start[0]).hypot(point[1] - self.start[1]);
+        best.unwrap_or(Foot { distance: off, along: 0.0, leg: None, is_beside: false })
+    }
+
+    /// Length of the path up to a reference at `time`, m.
+    fn reached(&self, time: f64, reference: [f64; 2]) -> f64 {
+        let now = self.legs.partition_point(|leg| leg.begin <= time);
+        let leg = now.checked_sub(1).map(|number| &self.legs[number]);
+        leg.map_or(0.0, |leg| leg.before + leg.beside(reference).0.clamp(0.0, 1.0) * leg.length)
     }
 
     /// Distance from a straight leg of a point that moves along these polynomials; none for an arc.
@@ -109,9 +161,41 @@ impl Contour {
     }
 }
 
+/// Follows a point along a path: other parts of the path that pass nearby (lines of a hatching, crossings) do not count.
+pub(super) struct Follower {
+    path: Contour,
+    /// Where the point was last, and its nearest point on the path.
+    point: [f64; 2],
+    foot: Foot,
+}
+
+impl Follower {
+    pub fn new(path: Contour) -> Self {
+        let foot = Foot { distance: 0.0, along: 0.0, leg: None, is_beside: false };
+        Self { point: path.start, path, foot }
+    }
+
+    /// Nearest point of the path at `time`, s, to a point that follows a reference.
+    pub fn nearest(&self, time: f64, point: [f64; 2], reference: [f64; 2]) -> Foot {
+        let far = |other: [f64; 2]| (point[0] - other[0]).hypot(point[1] - other[1]);
+        let cut = CUT * self.foot.distance.abs() + LEAST;
+        // What lags a reference on a straight line is at most its distance behind it.
+        let behind = self.path.reached(time, reference) - WAY * far(reference);
+        let least = (self.foot.along - cut).min(behind);
+        self.path.nearest(time, point, [least, self.foot.along + cut + WAY * far(self.point)])
+    }
+
+    /// The same; the point has come there.
+    pub fn follow(&mut self, time: f64, point: [f64; 2], reference: [f64; 2]) -> Foot {
+        self.foot = self.nearest(time, point, reference);
+        self.point = point;
+        self.foot
+    }
+}
+
 /// Gathers the distance from a path.
 pub(super) struct ContourGauge {
-    path: Contour,
+    follower: Follower,
     seen: Deviation,
     /// ∫ of its square.
     square: f64,
@@ -128,38 +212,41 @@ const STEPS: usize = 40;
 
 impl ContourGauge {
     pub fn new(path: Contour) -> Self {
-        Self { path, seen: Deviation::default(), square: 0.0 }
+        Self { follower: Follower::new(path), seen: Deviation::default(), square: 0.0 }
     }
 
     /// Adds the motion on a part of a curve; exact if one straight leg is the nearest on all of it.
-    pub fn track(&mut self, curve: &Curve, part: (f64, f64), places: &[Polynomial]) {
+    pub fn track(&mut self, curve: &Curve, part: (f64, f64), [places, references]: [&[Polynomial]; 2]) {
         let time = |s: f64| curve.begin + s * curve.length;
-        let at = |s: f64| self.path.nearest(time(s), [places[0].at(s), places[1].at(s)]);
+        let point = |of: &[Polynomial], s: f64| [of[0].at(s), of[1].at(s)];
+        let follower = &self.follower;
+        let at = |s: f64| follower.nearest(time(s), point(places, s), point(references, s));
         let spread = |k: usize| part.0 + (part.1 - part.0) * k as f64 / (PLACES - 1) as f64;
         let seen: [_; PLACES] = std::array::from_fn(|k| at(spread(k)));
-        let (_, leg, _) = seen[0];
-        let same = seen.iter().all(|&(_, other, is_beside)| is_beside && other == leg);
-        if let Some(distance) = leg.filter(|_| same).and_then(|leg| self.path.beside(leg, places)) {
+        let leg = seen[0].leg;
+        let same = seen.iter().all(|foot| foot.is_beside && foot.leg == leg);
+        if let Some(distance) = leg.filter(|_| same).and_then(|leg| follower.path.beside(leg, places)) {
             self.square += curve.length * integral(part, |s| distance.at(s).powi(2));
             larger(&mut self.seen.peak, &distance, part, curve);
-            return;
-        }
-        self.square += curve.length * integral(part, |s| at(s).0.powi(2));
-        let size = |k: usize| seen[k].0.abs();
-        let Some(most) = (0..PLACES).max_by(|a, b| size(*a).total_cmp(&size(*b))) else { return };
-        if size(most) > (1.0 - NEAR) * self.seen.peak.value.abs() {
-            let between = [most.saturating_sub(1), (most + 1).min(PLACES - 1)].map(spread);
-            let s = golden::top(between, STEPS, |s| at(s).0.abs());
-            let value = if at(s).0.abs() > size(most) { at(s).0 } else { seen[most].0 };
-            if value.abs() > self.seen.peak.value.abs() {
-                self.seen.peak = Peak { value, time: time(s) };
+        } else {
+            self.square += curve.length * integral(part, |s| at(s).distance.powi(2));
+            let size = |k: usize| seen[k].distance.abs();
+            let most = (1..PLACES).fold(0, |most, k| if size(k) > size(most) { k } else { most });
+            if size(most) > (1.0 - NEAR) * self.seen.peak.value.abs() {
+                let between = [most.saturating_sub(1), (most + 1).min(PLACES - 1)].map(spread);
+                let s = golden::top(between, STEPS, |s| at(s).distance.abs());
+                let value = if at(s).distance.abs() > size(most) { at(s).distance } else { seen[most].distance };
+                if value.abs() > self.seen.peak.value.abs() {
+                    self.seen.peak = Peak { value, time: time(s) };
+                }
             }
         }
+        self.follower.follow(time(part.1), point(places, part.1), point(references, part.1));
     }
 
     /// The run has ended there.
-    pub fn end(&mut self, time: f64, point: [f64; 2]) {
-        self.seen.last = self.path.nearest(time, point).0;
+    pub fn end(&mut self, time: f64, point: [f64; 2], reference: [f64; 2]) {
+        self.seen.last = self.follower.follow(time, point, reference).distance;
     }
 
     /// Contour error of a run that ended at `end`, s.
@@ -182,25 +269,55 @@ mod tests {
         Contour::along(&Profile::along(&[0.0, 0.0], &legs).unwrap()).unwrap()
     }
 
+    /// All of a path.
+    const WHOLE: [f64; 2] = [0.0, f64::INFINITY];
+
     #[test]
     fn distances_are_those_of_the_nearest_point() {
         let path = corner();
-        let (distance, leg, is_beside) = path.nearest(0.05, [0.03, 0.002]);
-        assert_eq!((leg, is_beside), (Some(0), true));
-        assert!((distance - 0.002).abs() < 1e-15);
+        let foot = path.nearest(0.05, [0.03, 0.002], WHOLE);
+        assert_eq!((foot.leg, foot.is_beside), (Some(0), true));
+        assert!((foot.distance - 0.002).abs() < 1e-15 && (foot.along - 0.03).abs() < 1e-15);
         // Beyond the corner, which it cuts to the right of neither leg.
-        let (distance, ..) = path.nearest(10.0, [0.103, -0.004]);
-        assert!((distance.abs() - 0.005).abs() < 1e-15);
+        let foot = path.nearest(10.0, [0.103, -0.004], WHOLE);
+        assert!((foot.distance.abs() - 0.005).abs() < 1e-15);
         // Behind its reference, the cart is still on the first leg.
-        let (distance, leg, _) = path.nearest(10.0, [0.05, 0.0]);
-        assert_eq!((distance, leg), (0.0, Some(0)));
+        let foot = path.nearest(10.0, [0.05, 0.0], WHOLE);
+        assert_eq!((foot.distance, foot.leg), (0.0, Some(0)));
+    }
+
+    /// Two lines there and back, closer to each other than the cart is to its own: it lags, deviates and swings.
+    #[test]
+    fn lines_that_were_left_do_not_count() {
+        let limits = Limits { speed: 0.5, acceleration: 5.0, jerk: None, snap: None };
+        for spacing in [2e-5, 1e-4, 3e-4, 2e-3] {
+            let legs = [[0.05, 0.0], [0.05, spacing], [0.0, spacing]].map(|to| Leg::To(to.to_vec(), limits));
+            let profiles = Profile::along(&[0.0, 0.0], &legs).unwrap();
+            let mut follower = Follower::new(Contour::along(&profiles).unwrap());
+            let back = profiles[0].passages()[2].begin;
+            for k in 0..=10_000 {
+                let time = profiles[0].end() * f64::from(k) / 1e4;
+                let at = |time: f64| profiles.iter().map(|profile| profile.at(time).position).collect::<Vec<_>>();
+                let (reference, lagging) = (at(time), at(time - 2e-3));
+                let wave = 4e-4 * (300.0 * time).sin();
+                let point = [lagging[0], lagging[1] + wave];
+                let foot = follower.follow(time, point, [reference[0], reference[1]]);
+                // To the left of the way back is down.
+                let way = [lagging[0], 0.05 - lagging[0]].into_iter().fold(f64::MAX, f64::min);
+                let (on_first, on_last) = (time < back, time > back + 2e-3);
+                if way > 4e-3 && (on_first || on_last) {
+                    let off = if on_first { point[1] } else { spacing - point[1] };
+                    assert!((foot.distance - off).abs() < 1e-12, "{spacing} {time}: {foot:?} {off}");
+                }
+            }
+        }
     }
 
     #[test]
     fn a_path_without_legs_is_its_start() {
         let still = Profile::new(0.25, &[Leg::Wait(1.0)]).unwrap();
         let path = Contour::along(&[still.clone(), still.clone()]).unwrap();
-        assert_eq!(path.nearest(0.5, [0.25, 0.35]).0, 0.35 - 0.25);
+        assert_eq!(path.nearest(0.5, [0.25, 0.35], WHOLE).distance, 0.35 - 0.25);
         assert!(Contour::along(&[still]).is_none());
     }
 
@@ -222,11 +339,12 @@ mod tests {
             let far = 0.004 + 0.0005 * f64::from(k);
             let point = [far * angle.cos(), far * angle.sin()];
             let least = points.iter().map(|p| (p[0] - point[0]).hypot(p[1] - point[1])).fold(f64::MAX, f64::min);
-            let (distance, ..) = path.nearest(10.0, point);
+            let distance = path.nearest(10.0, point, WHOLE).distance;
             // The points are up to 1 µm apart.
             assert!((-1e-12..1e-6).contains(&(least - distance.abs())), "{point:?}: {distance} {least}");
         }
         // Inside a counterclockwise circle is to the left of it, inside a clockwise one to the right.
-        assert!(path.nearest(0.0, [0.0, 0.009]).0 > 0.0 && path.nearest(10.0, [0.0, 0.019]).0 < 0.0);
+        let side = |time: f64, point: [f64; 2]| path.nearest(time, point, WHOLE).distance;
+        assert!(side(0.0, [0.0, 0.009]) > 0.0 && side(10.0, [0.0, 0.019]) < 0.0);
     }
 }

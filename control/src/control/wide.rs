@@ -1,6 +1,6 @@
 //! Rows of a move with references and errors.
 
-use super::contour::Contour;
+use super::contour::{Contour, Follower};
 use crate::machine::{Machine, SlideAt};
 use crate::signal::profile::Profile;
 use crate::trajectory::{Column, Trajectory};
@@ -9,7 +9,7 @@ use crate::trajectory::{Column, Trajectory};
 pub(super) struct Wide {
     block: Trajectory,
     /// The path of a machine with two coordinates.
-    contour: Option<Contour>,
+    contour: Option<Follower>,
     /// Columns of the positions, and names of the references and errors that go with them.
     loads: Vec<[String; 3]>,
 }
@@ -24,7 +24,7 @@ impl Wide {
         };
         Self {
             block: Trajectory::default(),
-            contour: Contour::along(profiles),
+            contour: Contour::along(profiles).map(Follower::new),
             loads: slides.iter().map(names).collect(),
         }
     }
@@ -48,10 +48,13 @@ impl Wide {
             place(names).iter().zip(reference).map(|(x, y)| x - y).collect()
         };
         let errors: Vec<Vec<f64>> = self.loads.iter().zip(&references).map(error).collect();
-        let away: Option<Vec<f64>> = match (&self.contour, &self.loads[..]) {
+        let away: Option<Vec<f64>> = match (&mut self.contour, &self.loads[..]) {
             (Some(contour), [x, y]) => {
-                let points = place(x).iter().zip(place(y)).zip(time);
-                Some(points.map(|((x, y), time)| contour.nearest(*time, [*x, *y]).0).collect())
+                let points = place(x).iter().zip(place(y)).zip(references[0].iter().zip(&references[1])).zip(time);
+                let follow = |(((x, y), (x_reference, y_reference)), time): (((&f64, &f64), (&f64, &f64)), &f64)| {
+                    contour.follow(*time, [*x, *y], [*x_reference, *y_reference]).distance
+                };
+                Some(points.map(follow).collect())
             }
             _ => None,
         };

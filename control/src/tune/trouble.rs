@@ -111,11 +111,9 @@ fn lost_steps(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move) 
     let drives = machine.geometry().drives.iter().zip(&run.metrics.drives);
     let of_drive = |(at, drive): (&DriveAt, &OfDrive)| {
         let (lost, first) = drive.lost_steps.and_then(|lost| Some((lost.at_end, lost.first_slip?)))?;
-        Some(format!(
-            "the {} loses step at {} and is {lost} full steps behind at the end",
-            at.label.name,
-            show(first, "s")
-        ))
+        let side = if lost < 0 { "ahead" } else { "behind" };
+        let (drive, first, lost) = (at.label.name, show(first, "s"), lost.abs());
+        Some(format!("the {drive} loses steps at {first} and is {lost} full steps {side} at the end"))
     };
     let lost: Vec<String> = drives.filter_map(of_drive).collect();
     if lost.is_empty() {

@@ -9,11 +9,15 @@
 //! at speed.
 //!
 //! The list of a machine in a plane may be that of a printer: its words E and Z, its M and T codes, and G28, G92 of
-//! other letters move neither coordinate and are passed over.
+//! other letters move neither coordinate and are passed over. So are `%`, numbers and checksums of lines (`N12 …*71`),
+//! the power S of a laser, and codes of controllers that say what is so here anyway: G17 (the plane of X and Y), G40,
+//! G49 and G80 (no compensation, no canned cycle), G54 (the first origin), G61, G64 and G91.1 (I and J from the start).
+//! M2 and M30 end the list.
 
 use super::arc::Arc;
 use super::profile::{Leg, Limits};
 use crate::error::{Error, Result};
+use std::ops::ControlFlow;
 
 /// The legs of a list of moves from `start` (m); `limits` are those of the machine, F lowers the speed.
 ///
@@ -33,14 +37,26 @@ pub fn legs(text: &str, start: &[f64], limits: &Limits) -> Result<Vec<Leg<Vec<f6
     let mut state = State { unit: 1e-3, relative: false, motion: Motion::Rapid, feed: None, position: start.to_vec() };
     let mut legs = Vec::new();
     for (number, line) in text.lines().enumerate() {
-        block(line, &mut state, limits, &mut legs)
+        let flow = block(line, &mut state, limits, &mut legs)
             .map_err(|error| Error { what: format!("line {} of the moves: {}", number + 1, error.what), ..error })?;
+        if flow.is_break() {
+            break;
+        }
     }
     if legs.is_empty() {
         return Err(Error::new("the list of moves is empty").next("write for example G1 X50 F3000"));
     }
     Ok(legs)
 }
+
+/// Codes that change nothing here.
+const IDLE: [f64; 8] = [17.0, 40.0, 49.0, 54.0, 61.0, 64.0, 80.0, 91.1];
+
+/// Codes that end a list.
+const ENDS: [f64; 2] = [2.0, 30.0];
+
+/// An arc whose end lies in this direction from its beginning, rad, is a whole circle: its end has been rounded.
+const WHOLE: f64 = 1e-6;
 
 /// The letters of the coordinates.
 const COORDINATES: [char; 2] = ['X', 'Y'];
@@ -87,13 +103,22 @@ impl State {
     }
 }
 
-fn block(line: &str, state: &mut State, limits: &Limits, legs: &mut Vec<Leg<Vec<f64>>>) -> Result<()> {
+/// Adds the legs of a line; a break at the end of the list.
+fn block(line: &str, state: &mut State, limits: &Limits, legs: &mut Vec<Leg<Vec<f64>>>) -> Result<ControlFlow<()>> {
     let in_plane = state.position.len() > 1;
     let words = words(line, state.known())?;
-    if state.passes_over(&words) {
-        return Ok(());
+    if words.iter().any(|(letter, value)| *letter == 'M' && ENDS.contains(value)) {
+        return Ok(ControlFlow::Break(()));
     }
-    let (mut to, mut wait) = (vec![None; state.position.len()], None);
+    if state.passes_over(&words) {
+        return Ok(ControlFlow::Continue(()));
+    }
+    let mut twice = words.iter().enumerate().filter(|(_, (letter, _))| *letter != 'G');
+    if let Some((_, (letter, _))) = twice.find(|(k, (letter, _))| words[..*k].iter().any(|(other, _)| other == letter))
+    {
+        return Err(Error::new(format!("`{letter}` stands twice in one line")).next("write a line for each move"));
+    }
+    let (mut to, mut wait, mut pause) = (vec![None; state.position.len()], None, None);
     let (mut off, mut radius) = ([None; 2], None);
     let mut dwell = false;
     for (letter, value) in words {
@@ -115,8 +140,9 @@ fn block(line: &str, state: &mut State, limits: &Limits, legs: &mut Vec<Leg<Vec<
                 return Err(Error::new(format!("a feed of {value}")).allowed("above zero, in mm/min"));
             }
             ('P', value) if value >= 0.0 => wait = Some(value * 1e-3),
-            ('S', value) if value >= 0.0 => wait = Some(value),
+            ('S', value) if value >= 0.0 => pause = Some(value),
             ('N', _) => {}
+            ('G', code) if IDLE.contains(&code) => {}
             ('G', 28.0 | 92.0) if in_plane => {
                 return Err(Error::new(format!("`G{value}` with X or Y homes the axes or moves their zero"))
                     .next("leave it out, and write all positions from one zero"));
@@ -129,11 +155,11 @@ fn block(line: &str, state: &mut State, limits: &Limits, legs: &mut Vec<Leg<Vec<
         }
     }
     if dwell {
-        let Some(wait) = wait else {
+        let Some(wait) = wait.or(pause) else {
             return Err(Error::new("G4 does not say how long").next("write G4 P200 for 200 ms, or G4 S0.2"));
         };
         legs.push(Leg::Wait(wait));
-    } else if wait.is_some() {
+    } else if wait.is_some() || (pause.is_some() && !in_plane) {
         return Err(Error::new("P and S belong to G4").allowed(state.known()));
     }
     let has_center = off.iter().any(Option::is_some);
@@ -142,7 +168,7 @@ fn block(line: &str, state: &mut State, limits: &Limits, legs: &mut Vec<Leg<Vec<
         return Err(Error::new("I, J and R belong to G2 and G3").allowed(state.known()));
     }
     if to.iter().all(Option::is_none) && !has_center {
-        return Ok(());
+        return Ok(ControlFlow::Continue(()));
     }
     let place = |(to, now): (&Option<f64>, &f64)| match (to, state.relative) {
         (None, _) => *now,
@@ -166,12 +192,15 @@ fn block(line: &str, state: &mut State, limits: &Limits, legs: &mut Vec<Leg<Vec<
                 (Some(radius), false) => center(from, to, radius, clockwise)?,
                 _ => return Err(Error::new("an arc needs its centre by I and J, or its radius by R, and not both")),
             };
-            Leg::Around(Arc { to, center, clockwise }, limits)
+            let off = |point: [f64; 2]| [point[0] - center[0], point[1] - center[1]];
+            let ([ax, ay], [bx, by]) = (off(from), off(to));
+            let is_whole = has_center && (ax * by - ay * bx).atan2(ax * bx + ay * by).abs() < WHOLE;
+            Leg::Around(Arc { to: if is_whole { from } else { to }, center, clockwise }, limits)
         }
         _ => Leg::To(target.clone(), limits),
     });
     state.position = target;
-    Ok(())
+    Ok(ControlFlow::Continue(()))
 }
 
 /// The centre of an arc between two points, by its radius: of the shorter arc, and of the longer one for a radius below
@@ -201,7 +230,7 @@ fn words(line: &str, known: &str) -> Result<Vec<(char, f64)>> {
     let mut inside = false;
     for c in line.chars() {
         match c {
-            ';' if !inside => break,
+            ';' | '%' | '*' if !inside => break,
             '(' => inside = true,
             ')' => inside = false,
             c if !inside && !c.is_whitespace() => plain.push(c.to_ascii_uppercase()),
@@ -215,7 +244,11 @@ fn words(line: &str, known: &str) -> Result<Vec<(char, f64)>> {
         let end = after.find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | '-' | '+'))).unwrap_or(after.len());
         let value = after[..end].parse::<f64>().ok().filter(|value| value.is_finite());
         let Some(value) = value.filter(|_| letter.is_ascii_alphabetic()) else {
-            return Err(Error::new(format!("`{letter}{}` is no word of G-code", &after[..end])).allowed(known));
+            let what = match letter.is_ascii_alphabetic() && after[..end].is_empty() {
+                true => format!("`{letter}` has no number"),
+                false => format!("`{letter}{}` is no word of G-code", &after[..end]),
+            };
+            return Err(Error::new(what).allowed(known));
         };
         words.push((letter, value));
         rest = &after[end..];
@@ -260,6 +293,27 @@ mod tests {
         let two = arcs("G2 I-10 F3000\nX-10 Y0 R10");
         assert!(near(two[0], Arc { to: [0.01, 0.0], center: [0.0, 0.0], clockwise: true }));
         assert!(near(two[1], Arc { to: [-0.01, 0.0], center: [0.0, 0.0], clockwise: true }));
+    }
+
+    #[test]
+    fn codes_that_change_nothing_are_passed_over() {
+        let text = "%\nG17 G40 G49 G80 G54\nN10 G90 G21*71\nG64 G91.1\nG1 X20 Y0 S800 F3000\nG4 S0.1\nM2\nG1 X0";
+        let list = legs(text, &[0.0, 0.0], &LIMITS).unwrap();
+        assert_eq!(list, [Leg::To(vec![0.02, 0.0], Limits { speed: 0.05, ..LIMITS }), Leg::Wait(0.1)]);
+        let what = |text: &str| legs(text, &[0.01, 0.0], &LIMITS).unwrap_err().what;
+        assert!(what("G1 X10 X20 F3000").contains("`X` stands twice"));
+        assert!(what("G28 X").contains("`X` has no number"));
+        assert!(legs("G1 X20 S800 F3000", &[0.0], &LIMITS).is_err());
+    }
+
+    /// The end of a whole circle is rounded along the radius or across it.
+    #[test]
+    fn a_whole_circle_stays_one() {
+        for text in ["G2 X10.005 Y0 I-10 F3000", "G2 X10 Y0.000009 I-10 F3000", "G3 X9.999 Y-0.000009 I-10 F3000"] {
+            let [arc] = arcs(text)[..] else { panic!("{text}") };
+            assert_eq!(arc.to, [0.01, 0.0], "{text}");
+        }
+        assert_ne!(arcs("G2 X10 Y0.1 I-10 F3000")[0].to, [0.01, 0.0]);
     }
 
     #[test]

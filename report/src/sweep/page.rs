@@ -12,6 +12,10 @@ pub fn page(title: &str, sweep: &Sweep, summary: &Summary, text: &str, figures: 
         if let Some(endings) = endings(group) {
             page.callout(Callout::Fails, format!("{}: not all runs came to their end", group.name), endings);
         }
+        if let Some(lost) = group.lost_steps() {
+            let callout = if lost.lost > 0 { Callout::Fails } else { Callout::Holds };
+            page.callout(callout, group.name.clone(), format!("{}.", lost.words()));
+        }
     }
     page.section("What was varied");
     let mut parameters =

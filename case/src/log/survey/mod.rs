@@ -114,10 +114,12 @@ impl Survey {
         }
         match &motion {
             Some(motion) => notes.extend(motion.notes(log.inputs.len())),
+            // An accelerometer measures the motion, but without its origin.
+            None if log.outputs.iter().any(|output| output.quantity.unit() != "A") => {}
             None => notes.push(Note::new(
                 "no-motion",
                 Severity::Warning,
-                "neither a position nor a speed was measured: only the electrical side can be fitted",
+                "neither a position nor a speed nor an acceleration was measured: only the electrical side can be fitted",
             )),
         }
         notes.extend(motion.as_ref().and_then(|motion| motion.across_gaps(log, &timing)));

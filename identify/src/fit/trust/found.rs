@@ -135,10 +135,14 @@ impl Fit {
         }
     }
 
-    /// The comparison of the belts of two drives; `None` for a machine with one drive, or if no free parameter changes
-    /// them.
-    pub fn belts(&self) -> Option<&Belts> {
-        self.identifiability.as_ref().and_then(|found| found.belts.as_ref()).map(|compared| &compared.belts)
+    /// The comparison of the belts of two drives, undetermined if the fit is doubtful for another reason than a missing
+    /// element, for which intervals are widened; `None` for a machine with one drive, or if no free parameter changes
+    /// the belts.
+    pub fn belts(&self) -> Option<Belts> {
+        let stated = self.identifiability.as_ref()?.belts.as_ref()?.belts.clone();
+        let element = self.cause.as_ref().map(|cause| cause.key);
+        let is_doubtful = self.warnings().any(|finding| Some(finding.code) != element);
+        Some(if is_doubtful { Belts { error: f64::INFINITY, ..stated } } else { stated })
     }
 
     /// The combinations of undetermined parameters that are determined.
