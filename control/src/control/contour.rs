@@ -9,12 +9,9 @@ use crate::signal::profile::{Passage, Profile};
 use crate::solve::{Curve, Polynomial, TERMS};
 use std::f64::consts::TAU;
 
-/// Along the path, the nearest point of a slide is at most this many times its distance from the path away from the one
-/// before, beside its own way: on both sides of a sharp corner that is cut.
-const CUT: f64 = 4.0;
-
-/// The same for its way, and for its distance from the reference.
-const WAY: f64 = 2.0;
+/// Along the path, the nearest point of a slide is at most this many times its largest distance from the reference away
+/// from the reference: on a half circle π/2 times, around a right angle √2 times.
+const LAG: f64 = 2.0;
 
 /// The same, least, m.
 const LEAST: f64 = 1e-9;
@@ -164,32 +161,30 @@ impl Contour {
 /// Follows a point along a path: other parts of the path that pass nearby (lines of a hatching, crossings) do not count.
 pub(super) struct Follower {
     path: Contour,
-    /// Where the point was last, and its nearest point on the path.
-    point: [f64; 2],
-    foot: Foot,
+    /// Largest distance from the reference so far, m.
+    lag: f64,
 }
 
 impl Follower {
     pub fn new(path: Contour) -> Self {
-        let foot = Foot { distance: 0.0, along: 0.0, leg: None, is_beside: false };
-        Self { point: path.start, path, foot }
+        Self { path, lag: 0.0 }
     }
 
     /// Nearest point of the path at `time`, s, to a point that follows a reference.
     pub fn nearest(&self, time: f64, point: [f64; 2], reference: [f64; 2]) -> Foot {
-        let far = |other: [f64; 2]| (point[0] - other[0]).hypot(point[1] - other[1]);
-        let cut = CUT * self.foot.distance.abs() + LEAST;
-        // What lags a reference on a straight line is at most its distance behind it.
-        let behind = self.path.reached(time, reference) - WAY * far(reference);
-        let least = (self.foot.along - cut).min(behind);
-        self.path.nearest(time, point, [least, self.foot.along + cut + WAY * far(self.point)])
+        let reach = LAG * self.lag_with(point, reference) + LEAST;
+        let at = self.path.reached(time, reference);
+        self.path.nearest(time, point, [at - reach, at + reach])
     }
 
     /// The same; the point has come there.
     pub fn follow(&mut self, time: f64, point: [f64; 2], reference: [f64; 2]) -> Foot {
-        self.foot = self.nearest(time, point, reference);
-        self.point = point;
-        self.foot
+        self.lag = self.lag_with(point, reference);
+        self.nearest(time, point, reference)
+    }
+
+    fn lag_with(&self, point: [f64; 2], reference: [f64; 2]) -> f64 {
+        self.lag.max((point[0] - reference[0]).hypot(point[1] - reference[1]))
     }
 }
 
