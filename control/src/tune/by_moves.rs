@@ -128,7 +128,7 @@ impl Work<'_> {
     /// about the best, then again with the simplex as long as other machines are worst for the result. Returns all
     /// designs run that keep the limits on the set, and the watched machines.
     pub fn by_moves(&mut self, finalists: &[Finalist], weighed: &Weighed) -> Result<(Vec<Tried>, Watch)> {
-        self.grant();
+        self.grant(1.0);
         let mut watch = Watch::default();
         let mut archive: Vec<Tried> = Vec::new();
         if let Some(first) = finalists.first() {
@@ -209,9 +209,9 @@ impl Work<'_> {
         self.spent.set(self.spent.get() + (motion.until / design.every) as u64);
     }
 
-    /// Renews the budget of a search.
-    pub fn grant(&mut self) {
-        self.most = self.charged() + (self.tuning.effort * SAMPLES as f64) as u64;
+    /// Grants a search this many times the budget.
+    pub fn grant(&mut self, times: f64) {
+        self.most = self.charged() + (times * self.tuning.effort * SAMPLES as f64) as u64;
     }
 
     /// True if the budget of samples of moves is spent.

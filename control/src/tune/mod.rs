@@ -300,7 +300,7 @@ impl Work<'_> {
         let weighed = Weighed { cost, bars };
         let mut latest = after.clone();
         // This search gets the budget once more.
-        self.grant();
+        self.grant(1.0);
         for round in 0..KEPT {
             if (self.stop)() || self.is_spent() {
                 break;
