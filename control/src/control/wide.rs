@@ -50,11 +50,12 @@ impl Wide {
         let errors: Vec<Vec<f64>> = self.loads.iter().zip(&references).map(error).collect();
         let away: Option<Vec<f64>> = match (&mut self.contour, &self.loads[..]) {
             (Some(contour), [x, y]) => {
-                let points = place(x).iter().zip(place(y)).zip(references[0].iter().zip(&references[1])).zip(time);
-                let follow = |(((x, y), (x_reference, y_reference)), time): (((&f64, &f64), (&f64, &f64)), &f64)| {
-                    contour.follow(*time, [*x, *y], [*x_reference, *y_reference]).distance
+                let (x, y) = (place(x), place(y));
+                let follow = |(row, time): (usize, &f64)| {
+                    let reference = [references[0][row], references[1][row]];
+                    contour.follow(*time, [x[row], y[row]], reference).distance
                 };
-                Some(points.map(follow).collect())
+                Some(time.iter().enumerate().map(follow).collect())
             }
             _ => None,
         };
