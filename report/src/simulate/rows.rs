@@ -181,12 +181,7 @@ pub fn lost_steps(metrics: &Metrics, geometry: &Geometry) -> Option<String> {
         let first = own.first_slip?;
         let by = if lost.len() > 1 { format!(" by the {}", at.label.name) } else { String::new() };
         let slips = if own.slips == 1 { "slip" } else { "slips" };
-        Some(format!(
-            "{}{by} at the end, after {} {slips} of 4 steps, first at {}",
-            own.at_end,
-            own.slips,
-            value(first, "s")
-        ))
+        Some(format!("{}{by} at the end, in {} {slips} of 4, first at {}", own.at_end, own.slips, value(first, "s")))
     };
     let slipped: Vec<String> = lost.iter().zip(geometry.drives).filter_map(of_drive).collect();
     let of_load = |(load, at): (&OfLoad, &SlideAt)| {
