@@ -146,7 +146,7 @@ impl Draw {
 fn margins(case: &Case) -> Margins {
     let design = case.controller.as_ref().unwrap();
     let feedback = Feedback::new(design, &case.machine).unwrap();
-    Margins::of(&Plant::of(&case.machine, Operation::default(), design, &feedback.corners()).unwrap(), &feedback)
+    Margins::new(&Plant::new(&case.machine, Operation::default(), design, &feedback.corners()).unwrap(), &feedback)
 }
 
 /// The least of a figure over all breaks, and whether a break has it.

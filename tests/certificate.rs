@@ -16,16 +16,16 @@ const INSIDE: usize = 60;
 
 fn family(case: &Case, spread: f64) -> (Family, Design) {
     let tuning = Tuning { spread: Some(spread), ..Tuning::default() };
-    (Family::of(case, &tuning).unwrap(), case.controller.clone().unwrap())
+    (Family::new(case, &tuning).unwrap(), case.controller.clone().unwrap())
 }
 
 fn certificate(family: &Family, design: &Design, limits: [f64; 2]) -> Certificate {
-    Certificate::of(family, design, limits, &|| false).unwrap()
+    Certificate::new(family, design, limits, &|| false).unwrap()
 }
 
 fn margins(family: &Family, design: &Design, corner: &Corner) -> Margins {
     let feedback = Feedback::new(design, &family.machine).unwrap();
-    Margins::of(&family.plant(corner, design, &feedback.corners()).unwrap(), &feedback)
+    Margins::new(&family.plant(corner, design, &feedback.corners()).unwrap(), &feedback)
 }
 
 /// A machine of the family's box times `factor`; each unknown at an end with a probability of one half.

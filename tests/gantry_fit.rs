@@ -215,6 +215,32 @@ fn intervals_of_gantries_hold_the_truth_about_as_often_as_they_say() {
     assert!(found.stated as f64 >= 0.8 * found.machines as f64, "{}", found.told());
 }
 
+/// The constants of one motor are off, which belts imitate.
+#[test]
+fn belts_of_a_doubtful_fit_are_undecided() {
+    let alike = ["belt.stiffness=[1e5, 1e5, 1e5, 1e5]"];
+    let plain = case(MachineKind::CoreXy, &alike);
+    let [torque, back] =
+        [plain.machine.drives[1].motor.torque_constant, plain.machine.drives[1].motor.back_emf_constant];
+    let off = [
+        format!("right_drive.motor.torque_constant={}", 0.85 * torque),
+        format!("right_drive.motor.back_emf_constant={}", 0.85 * back),
+    ];
+    let changes = [alike[0], &off[0], &off[1]];
+    let own = with_log(plain, &case(MachineKind::CoreXy, &changes), None, 3);
+    let found = fitted(&own, &belts_of_core_xy(&FREE));
+    assert!(found.warnings().next().is_some());
+    let belts = found.belts().unwrap();
+    assert_eq!(belts.looser(), None, "{}", belts.words());
+    // The same with these constants.
+    let knowing = fitted(
+        &with_log(case(MachineKind::CoreXy, &changes), &case(MachineKind::CoreXy, &changes), None, 3),
+        &belts_of_core_xy(&FREE),
+    );
+    let [low, high] = knowing.belts().unwrap().interval();
+    assert!(low < 1.0 && 1.0 < high && high / low < 1.2, "{low} to {high}");
+}
+
 #[test]
 fn an_h_frame_is_fitted_with_all_three_spans() {
     let truth = ["belt.stiffness=[1.2e5, 0.9e5, 0.6e5]", "left_drive.motor.resistance=0.74", "cart.mass=0.4"];

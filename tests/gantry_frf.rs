@@ -284,7 +284,7 @@ fn measured_margins_of_both_loops() {
     let known = Known::new(&case, None, None, None).unwrap();
     let found = measure(&case, &Cut { segment: Some(2.048), period: None }, known).unwrap();
     let design = case.controller.clone().unwrap();
-    let plant = Plant::of(&case.machine, Operation::default(), &design, &[]).unwrap();
+    let plant = Plant::new(&case.machine, Operation::default(), &design, &[]).unwrap();
     let all = loops(&plant, &Feedback::new(&design, &case.machine).unwrap());
     // Of each drive the response of what it measures, and of nothing else.
     let own: Vec<_> = found.responses.iter().filter_map(|one| Some((one.frf.title(), one.margins?))).collect();

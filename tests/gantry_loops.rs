@@ -147,8 +147,8 @@ fn margins_are_those_of_matrices_on_a_dense_grid() {
         let case = drawn(number);
         let design = case.controller.as_ref().unwrap();
         let feedback = Feedback::new(design, &case.machine).unwrap();
-        let plant = Plant::of(&case.machine, Operation::default(), design, &feedback.corners()).unwrap();
-        let margins = Margins::of(&plant, &feedback);
+        let plant = Plant::new(&case.machine, Operation::default(), design, &feedback.corners()).unwrap();
+        let margins = Margins::new(&plant, &feedback);
         if !margins.stable {
             continue;
         }
@@ -219,8 +219,8 @@ fn a_drive_swings_beyond_its_gain_margin() {
         let case = drawn(number);
         let design = case.controller.as_ref().unwrap();
         let feedback = Feedback::new(design, &case.machine).unwrap();
-        let plant = Plant::of(&case.machine, Operation::default(), design, &feedback.corners()).unwrap();
-        let margins = Margins::of(&plant, &feedback);
+        let plant = Plant::new(&case.machine, Operation::default(), design, &feedback.corners()).unwrap();
+        let margins = Margins::new(&plant, &feedback);
         let drives = case.machine.drives.len();
         let calm = |gains: Vec<f64>| {
             let of_drive = |inner: Standard, gain: f64| Louder { inner, gain };

@@ -177,9 +177,9 @@ impl Plain {
         starts.zip(&self.points).enumerate().map(of).collect()
     }
 
-    /// Where the reference is: trapezoids of speed from point to point.
-    fn reference(&self, time: f64) -> [f64; 2] {
-        let mut left = time;
+    /// Where the reference is, and the length of its path up to there: trapezoids of speed from point to point.
+    fn reference(&self, time: f64) -> ([f64; 2], f64) {
+        let (mut left, mut before) = (time, 0.0);
         for Course { from, to, arc, length, speed } in self.legs() {
             let (v, a) = (speed, self.acceleration);
             let (ramp, whole) = (v / a, length / v + v / a);
@@ -189,18 +189,23 @@ impl Plain {
                     t if t > whole - ramp => length - 0.5 * a * (whole - t).powi(2),
                     t => v * (t - 0.5 * ramp),
                 };
-                let share = way / length;
-                return match arc {
-                    None => [0, 1].map(|k| from[k] + (to[k] - from[k]) * share),
-                    Some((radius, begin, turn)) => {
-                        let (sin, cos) = (begin + turn * share).sin_cos();
-                        [self.center[0] + radius * cos, self.center[1] + radius * sin]
-                    }
-                };
+                return (self.place(&Course { from, to, arc, length, speed }, way / length), before + way);
             }
             left -= whole;
+            before += length;
         }
-        *self.points.last().unwrap()
+        (*self.points.last().unwrap(), before)
+    }
+
+    /// The point at this share of a leg.
+    fn place(&self, Course { from, to, arc, .. }: &Course, share: f64) -> [f64; 2] {
+        match arc {
+            None => [0, 1].map(|k| from[k] + (to[k] - from[k]) * share),
+            Some((radius, begin, turn)) => {
+                let (sin, cos) = (begin + turn * share).sin_cos();
+                [self.center[0] + radius * cos, self.center[1] + radius * sin]
+            }
+        }
     }
 
     fn rates(&self, z: &[f64; 10], volts: [f64; 3]) -> [f64; 10] {
@@ -230,22 +235,37 @@ impl Plain {
         std::iter::once(0.0).chain(ends).collect()
     }
 
-    /// Distance from the path, whichever leg is nearest of those that have begun and the next.
-    fn off(&self, legs: &[Course], point: [f64; 2]) -> f64 {
-        let of_leg = |Course { from, to, arc, .. }: &Course| {
-            let far = |end: [f64; 2]| (point[0] - end[0]).hypot(point[1] - end[1]);
-            let Some((radius, begin, turn)) = arc else {
-                let along = [to[0] - from[0], to[1] - from[1]];
-                let square = along[0].powi(2) + along[1].powi(2);
-                let share = ((point[0] - from[0]) * along[0] + (point[1] - from[1]) * along[1]) / square;
-                let share = share.clamp(0.0, 1.0);
-                return far([from[0] + share * along[0], from[1] + share * along[1]]);
+    /// Distance from the path between two lengths along it, by legs that have begun and the next.
+    fn off(&self, legs: &[Course], point: [f64; 2], [low, high]: [f64; 2]) -> f64 {
+        let mut before = 0.0;
+        let mut least = f64::INFINITY;
+        for leg in legs {
+            let [first, last] = [low, high].map(|along| ((along - before) / leg.length).clamp(0.0, 1.0));
+            let is_there = low <= before + leg.length && before <= high;
+            before += leg.length;
+            let far = |share: f64| {
+                let end = self.place(leg, share);
+                (point[0] - end[0]).hypot(point[1] - end[1])
             };
-            let [x, y] = [point[0] - self.center[0], point[1] - self.center[1]];
-            let angle = (turn.signum() * (y.atan2(x) - begin)).rem_euclid(TAU);
-            if angle <= turn.abs() { (radius - x.hypot(y)).abs() } else { far(*from).min(far(*to)) }
-        };
-        legs.iter().map(of_leg).fold(f64::INFINITY, f64::min)
+            let distance = match leg.arc {
+                None => {
+                    let along = [leg.to[0] - leg.from[0], leg.to[1] - leg.from[1]];
+                    let square = along[0].powi(2) + along[1].powi(2);
+                    let way = (point[0] - leg.from[0]) * along[0] + (point[1] - leg.from[1]) * along[1];
+                    far((way / square).clamp(first, last))
+                }
+                Some((radius, begin, turn)) => {
+                    let [x, y] = [point[0] - self.center[0], point[1] - self.center[1]];
+                    let share = (turn.signum() * (y.atan2(x) - begin)).rem_euclid(TAU) / turn.abs();
+                    let is_beside = (first..=last).contains(&share);
+                    if is_beside { (radius - x.hypot(y)).abs() } else { far(first).min(far(last)) }
+                }
+            };
+            if is_there {
+                least = least.min(distance);
+            }
+        }
+        least
     }
 
     /// Runge and Kutta's method with this many steps a sample: the end of bridge and cart, peak and root mean square of
@@ -253,10 +273,10 @@ impl Plain {
     fn integrated(&self, steps: usize) -> ([f64; 2], [f64; 3]) {
         let (mut z, h) = ([0.0; 10], self.every / steps as f64);
         let samples = (self.until / self.every).round() as usize;
-        let (mut peak, mut square, mut change, mut last) = (0.0_f64, 0.0, 0.0, 0.0);
+        let (mut peak, mut square, mut change, mut last, mut lag) = (0.0_f64, 0.0, 0.0, 0.0, 0.0_f64);
         let (begins, legs) = (self.begins(), self.legs());
         for sample in 0..samples {
-            let wanted = self.drives(self.reference(sample as f64 * self.every));
+            let wanted = self.drives(self.reference(sample as f64 * self.every).0);
             let volts = [0, 1, 2].map(|motor: usize| {
                 (self.gain * (wanted[motor] - self.radius * z[motor])).clamp(-self.limit, self.limit)
             });
@@ -269,7 +289,10 @@ impl Plain {
                 let d = self.rates(&step(h, &c), volts);
                 z = std::array::from_fn(|n| z[n] + h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]));
                 let begun = begins.iter().take_while(|begin| **begin <= time).count();
-                let off = self.off(&legs[..(begun + 1).min(legs.len())], [z[3], z[4]]);
+                let (reference, at) = self.reference(time);
+                lag = lag.max((z[3] - reference[0]).hypot(z[4] - reference[1]));
+                let near = [at - 2.0 * lag, at + 2.0 * lag];
+                let off = self.off(&legs[..(begun + 1).min(legs.len())], [z[3], z[4]], near);
                 if off > peak {
                     (peak, change) = (off, off - last);
                 }

@@ -68,7 +68,7 @@ fn learned(case: &Case, truth: &Case, at: At, repetitions: usize) -> Vec<Learned
 /// A machine somewhere within the uncertainty that the case states.
 fn hidden(case: &Case, seed: u64) -> Case {
     let mut random = Pcg64::new(6, u128::from(seed));
-    let family = Family::of(case, &case.tune.clone().unwrap_or_default()).unwrap();
+    let family = Family::new(case, &case.tune.clone().unwrap_or_default()).unwrap();
     let nominal = family.nominal();
     let mut off = vec![0.0; family.unknowns.len()];
     // What varies by itself, with all that varies with it, is at its upper end in every second of these.

@@ -18,8 +18,8 @@ fn no_peak_is_missed_on_two_hundred_loops() {
         let case = Case::from_text("loop.toml", one["case"].as_str().unwrap()).unwrap_or_else(|e| panic!("{e}"));
         let design = case.controller.as_ref().unwrap();
         let feedback = Feedback::new(design, &case.machine).unwrap();
-        let plant = Plant::of(&case.machine, Operation::default(), design, &feedback.corners()).unwrap();
-        let margins = Margins::of(&plant, &feedback);
+        let plant = Plant::new(&case.machine, Operation::default(), design, &feedback.corners()).unwrap();
+        let margins = Margins::new(&plant, &feedback);
         assert_eq!(margins.stable, one["stable"].as_bool().unwrap(), "loop {number}, radius {}", one["radius"]);
         if !margins.stable {
             continue;

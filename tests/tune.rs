@@ -147,7 +147,7 @@ fn a_placed_loop_swings_as_asked() {
     let case = case("pid.toml", &changes);
     let design = place(case.controller.as_ref().unwrap(), &case.machine, hertz, damping).unwrap();
     let feedback = Feedback::new(&design, &case.machine).unwrap();
-    let plant = Plant::of(&case.machine, Operation::default(), &design, &[]).unwrap();
+    let plant = Plant::new(&case.machine, Operation::default(), &design, &[]).unwrap();
     // |T| of a PD loop on M s² + d s: (2ζ′ω s + ω²)/(s² + 2ζω s + ω²), ζ′ what K_d gives of ζ
     let rigid = Rigid::new(&case.machine);
     let Structure::Pid(gains) = &design.structure else { panic!() };
@@ -159,7 +159,7 @@ fn a_placed_loop_swings_as_asked() {
             (own / (s * s * rigid.mass + s * rigid.drag() + own)).norm()
         })
         .fold(0.0, f64::max);
-    let margins = Margins::of(&plant, &feedback);
+    let margins = Margins::new(&plant, &feedback);
     assert!(margins.stable);
     assert!((margins.complementary / most - 1.0).abs() < 1e-2, "{} {most}", margins.complementary);
 }
@@ -254,7 +254,7 @@ fn the_worst_axis_is_worse_than_random_ones() {
                 load: 0.3 * share(&mut random),
                 off: family.unknowns.iter().map(|_| 2.0 * share(&mut random) - 1.0).collect(),
             };
-            let margins = Margins::of(&family.plant(&corner, design, &feedback.corners()).unwrap(), &feedback);
+            let margins = Margins::new(&family.plant(&corner, design, &feedback.corners()).unwrap(), &feedback);
             assert!(margins.stable, "{name} draw {draw}: {corner:?} {margins:?}\n{:?} {design:?}", tuned.after.worst);
             most = most.max(margins.excess(tuning.sensitivity, tuning.complementary));
             if draw < 12 {
@@ -412,7 +412,7 @@ fn what_is_one_number_by_nature_varies_as_one() {
     .concat();
     let text = format!("{}\n[uncertainty]\n{table}", case("pid.toml", &[]).text);
     let case = Case::from_text("known.toml", &text).unwrap_or_else(|error| panic!("{error}"));
-    let family = Family::of(&case, &Tuning::default()).unwrap();
+    let family = Family::new(&case, &Tuning::default()).unwrap();
     let mut masses = Vec::new();
     for corner in &family.machines {
         let stage = family.stage_at(corner);
@@ -533,14 +533,14 @@ fn draws_of_a_posterior_are_the_family() {
     let plan = Some(taut::case::Plan { free, ..taut::case::Plan::default() });
     let drawn = Case { fit: plan, ..case("pid.toml", &[]) };
     let tuning = Tuning { draws: Some(file.clone()), ..Tuning::default() };
-    let family = Family::of(&drawn, &tuning).unwrap();
+    let family = Family::new(&drawn, &tuning).unwrap();
     assert_eq!((family.source, family.machines.len()), (taut::tune::Source::Posterior(80), 41));
     for corner in &family.machines[1..] {
         let machine = family.stage_at(corner);
         let (m, d) = (machine.cart.mass / mass - 1.0, machine.cart.friction.forward.viscous / viscous - 1.0);
         assert!((m + d).abs() < 1e-9 && m.abs() <= 0.05 + 1e-9, "{m} {d}");
     }
-    let none = Family::of(&case("pid.toml", &[]), &tuning).unwrap_err().to_string();
+    let none = Family::new(&case("pid.toml", &[]), &tuning).unwrap_err().to_string();
     assert!(none.contains("this case has no [fit]"), "{none}");
 }
 

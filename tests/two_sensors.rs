@@ -142,8 +142,8 @@ fn a_disturbance_observer_of_both_sensors_keeps_more_margin() {
         let case = case("controllers/pid-observer", changes);
         let design = case.controller.clone().unwrap();
         let feedback = Feedback::new(&design, &case.machine).unwrap();
-        let plant = Plant::of(&case.machine, Operation::default(), &design, &feedback.corners()).unwrap();
-        Margins::of(&plant, &feedback)
+        let plant = Plant::new(&case.machine, Operation::default(), &design, &feedback.corners()).unwrap();
+        Margins::new(&plant, &feedback)
     };
     let softer = "controller.pid={ proportional = 1500, integral = 0, derivative = 5, filter = 200 }";
     let [with, without] = [peak(&[quick, softer, SCALE]), peak(&[quick, softer])];

@@ -115,7 +115,7 @@ fn what_was_never_fitted_keeps_its_spread() {
     let text =
         format!("{}\n[uncertainty]\n\"cart.mass\" = {{ low = {}, high = {} }}\n", plain.text, 0.99 * mass, 1.01 * mass);
     let fitted = Case::from_text(folder.join("fitted.toml"), &text).unwrap();
-    let [all, some] = [&plain, &fitted].map(|case| Family::of(case, &Tuning::default()).unwrap());
+    let [all, some] = [&plain, &fitted].map(|case| Family::new(case, &Tuning::default()).unwrap());
     assert_eq!(some.unknowns.len(), all.unknowns.len(), "{:?}", some.unknowns);
     for unknown in &some.unknowns {
         let share = (unknown.high - unknown.low) / (unknown.high + unknown.low);
@@ -176,8 +176,8 @@ fn suggested_gains_have_margins_on_drawn_axes() {
         let hint = told.split("add for example ").nth(1).unwrap_or_else(|| panic!("{told}")).trim();
         let case = Case::from_text_with("axis.toml", &format!("{head}{hint}\n"), &sets).unwrap();
         let design = case.controller.as_ref().unwrap();
-        let plant = Plant::of(&case.machine, Operation::default(), design, &[]).unwrap();
-        let margins = Margins::of(&plant, &Feedback::new(design, &case.machine).unwrap());
+        let plant = Plant::new(&case.machine, Operation::default(), design, &[]).unwrap();
+        let margins = Margins::new(&plant, &Feedback::new(design, &case.machine).unwrap());
         assert!(margins.excess(1.7, 1.7) <= 1.0, "{hint}, every {every}: {margins:?}\n{sets:?}");
     }
 }
@@ -231,8 +231,8 @@ fn suggested_gains_of_two_motors_on_a_bridge_move_it() {
         let case = suggested(&gantry_template(kind), false);
         let design = case.controller.as_ref().unwrap();
         let feedback = Feedback::new(design, &case.machine).unwrap();
-        let plant = Plant::of(&case.machine, Operation::default(), design, &feedback.corners()).unwrap();
-        let margins = Margins::of(&plant, &feedback);
+        let plant = Plant::new(&case.machine, Operation::default(), design, &feedback.corners()).unwrap();
+        let margins = Margins::new(&plant, &feedback);
         // rad/s: above 0.3 Hz
         assert!(margins.stable && margins.sensitivity <= 1.5, "{kind:?}: {design:?}: {margins:?}");
         assert!(margins.crossover > 2.0, "{kind:?}: {design:?}: {margins:?}");

@@ -147,9 +147,9 @@ fn warnings(done: &Done) -> Option<String> {
 fn nyquist(case: &Case, design: &Design) -> Result<(Margins, f64, [Vec<f64>; 5], bool)> {
     let tuning = case.tune.clone().unwrap_or_default();
     let feedback = Feedback::new(design, &case.machine)?;
-    let family = Family::of(case, &tuning)?;
+    let family = Family::new(case, &tuning)?;
     let plant = family.plant(&family.nominal(), design, &feedback.corners())?;
-    let margins = Margins::of(&plant, &feedback);
+    let margins = Margins::new(&plant, &feedback);
     let open = loops(&plant, &feedback);
     let of = |value: &dyn Fn(&Loops) -> f64| open.iter().map(value).collect::<Vec<f64>>();
     let (at, drive) = (margins.breaks.sensitivity, margins.breaks.gain_drive);

@@ -247,7 +247,7 @@ fn learned<const M: usize>(
     let before: Vec<Vec<f64>> = (0..geometry.drives.len()).map(signal).collect();
     let signals: Vec<Vec<f64>> = geometry.slides.iter().map(|slide| weighed(&before, slide.by_drives, n)).collect();
     let transform = Transform::new(n, every);
-    let family = Family::of(case, &case.tune.clone().unwrap_or_default())?;
+    let family = Family::new(case, &case.tune.clone().unwrap_or_default())?;
     let responses = responses(&family, (design, &feedback), trial.at, &transform, stop)?;
     let rule = Rule::<M>::new(&responses)?;
     let taper = taper(n, motion.end() / every);
@@ -438,7 +438,7 @@ fn responses<const M: usize>(
             return Err(Error::new("interrupted before anything was learned"));
         }
         let plant = family.plant(corner, design, &feedback.corners())?;
-        if !Peaks::of(&plant, feedback).is_stable() {
+        if !Peaks::new(&plant, feedback).is_stable() {
             return Err(Error::new(format!(
                 "the loop is not stable on an axis of the family: {}",
                 family.words(corner)

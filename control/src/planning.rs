@@ -114,7 +114,7 @@ pub fn plan(case: &Case, places: &[usize], wanted: &Wanted, stop: &dyn Fn() -> b
     let Some(design) = &case.controller else {
         return Err(Error::new("there is no controller that could follow a move").next("add [controller]"));
     };
-    let family = Family::of(case, &case.tune.clone().unwrap_or_default())?;
+    let family = Family::new(case, &case.tune.clone().unwrap_or_default())?;
     let modes = modes(&case.machine);
     let mut machines: Vec<(Machine, usize)> = Vec::new();
     for machine in family.machines.iter().map(|corner| family.stage_at(corner)) {

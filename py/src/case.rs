@@ -1,7 +1,7 @@
 //! Cases and what is done with them.
 
 use crate::columns::Columns;
-use crate::error::{Told, guarded, unlocked};
+use crate::error::{IntoPython, guarded, unlocked};
 use crate::interrupt::Interrupt;
 use crate::{fmu, logs, modes, runs, value};
 use pyo3::exceptions::PyValueError;

@@ -1,7 +1,7 @@
 //! Columns of numbers as NumPy arrays: the memory that Rust has filled is handed over, never copied, and nobody writes
 //! into it.
 
-use crate::error::Told;
+use crate::error::IntoPython;
 use numpy::{IntoPyArray, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};

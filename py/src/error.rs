@@ -91,12 +91,12 @@ fn describe(exception: &Bound<'_, PyAny>, error: taut::Error) -> PyResult<()> {
 }
 
 /// Results of the library as results of Python.
-pub trait Told<T> {
+pub trait IntoPython<T> {
     /// This result with a Python exception for its error.
     fn told(self, py: Python<'_>) -> PyResult<T>;
 }
 
-impl<T> Told<T> for taut::Result<T> {
+impl<T> IntoPython<T> for taut::Result<T> {
     fn told(self, py: Python<'_>) -> PyResult<T> {
         self.map_err(|error| told(py, error))
     }

@@ -2,7 +2,7 @@
 
 use crate::columns::{self, Columns};
 use crate::controller::Own;
-use crate::error::{Told, guarded, unlocked};
+use crate::error::{IntoPython, guarded, unlocked};
 use crate::interrupt::Interrupt;
 use crate::value;
 use pyo3::exceptions::PyRecursionError;

@@ -1,6 +1,6 @@
 //! Input shapers from files of vibration.
 
-use crate::error::{Told, guarded, unlocked};
+use crate::error::{IntoPython, guarded, unlocked};
 use crate::value;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

@@ -2,7 +2,7 @@
 
 use crate::case::Case;
 use crate::columns::{self, Columns};
-use crate::error::{Told, unlocked};
+use crate::error::{IntoPython, unlocked};
 use crate::interrupt::Interrupt;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;

@@ -27,8 +27,8 @@ pub fn is_that_of_runs(name: &str, case: &Case, every: usize) {
     };
     let feedback = Feedback::new(design, &case.machine).unwrap();
     let told = |step: usize| {
-        let plant = Plant::of(&louder(step), Operation::default(), design, &feedback.corners()).unwrap();
-        Margins::of(&plant, &feedback).stable
+        let plant = Plant::new(&louder(step), Operation::default(), design, &feedback.corners()).unwrap();
+        Margins::new(&plant, &feedback).stable
     };
     let told: Vec<bool> = (0..30).map(told).collect();
     let mut both = [0, 0];

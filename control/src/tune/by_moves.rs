@@ -5,7 +5,7 @@ use super::edge::Edge;
 use super::evolution::evolve;
 use super::gains::{rounded, shaped};
 use super::objective::{AtWorst, BALANCES, Balance, MoveFigures, Runner, objective};
-use super::search::{Found, minimise_below};
+use super::search::{Optimum, minimise_below};
 use super::tried::{Bars, Tried, Weighed};
 use super::watch::Watch;
 use super::work::{FINALISTS, Finalist, Work};
@@ -111,7 +111,7 @@ impl Work<'_> {
                 if seen[k].len() <= left_out && seen[k].len() < watch.axes[k].len() {
                     continue;
                 }
-                worst[k] = AtWorst::of(&seen[k], left_out);
+                worst[k] = AtWorst::new(&seen[k], left_out);
                 value = self.valued(weighed.cost, &BALANCES[1], &worst, weighed.bars);
                 if value >= bar {
                     return (worst, value);
@@ -201,7 +201,7 @@ impl Work<'_> {
     /// Adds the machines that are worst for a design to the watched ones; true if any is new.
     fn watched_by(&self, design: &Design, watch: &mut Watch) -> Result<bool> {
         let seen = self.glanced(design)?;
-        Ok(watch.join(&Watch::of(&seen, self.family.left_out(self.stages.len()))))
+        Ok(watch.join(&Watch::new(&seen, self.family.left_out(self.stages.len()))))
     }
 
     /// Counts the samples of a move.
@@ -281,7 +281,7 @@ impl Work<'_> {
             }
             let mut value =
                 |x: &[f64], bar: f64| self.of_moves((finalist, layout, x), watch, weighed, (spread.edge, bar), archive);
-            let members = all.into_iter().map(|x| Found { value: value(&x, f64::INFINITY), x }).collect();
+            let members = all.into_iter().map(|x| Optimum { value: value(&x, f64::INFINITY), x }).collect();
             let found = evolve(members, spread.generations, seed, &mut value);
             let Some(best) = found.first() else { break };
             let design = rounded(&shaped(&finalist.start, finalist.own, &best.x));

@@ -3,7 +3,7 @@
 //! mutation "current to p-best" of J. Zhang, A. C. Sanderson, "JADE: adaptive differential evolution with optional
 //! external archive", IEEE Trans. Evolutionary Computation 13, 2009.
 
-use super::search::Found;
+use super::search::Optimum;
 use crate::chance::uniform;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
@@ -18,14 +18,14 @@ const FACTORS: [f64; 2] = [0.4, 0.9];
 /// Returns the members after this number of generations, the best first. `function` gets a point and the value to beat;
 /// if it is not better, it may return any value that is not below that.
 pub(crate) fn evolve(
-    mut members: Vec<Found>,
+    mut members: Vec<Optimum>,
     generations: usize,
     seed: u64,
     function: &mut dyn FnMut(&[f64], f64) -> f64,
-) -> Vec<Found> {
+) -> Vec<Optimum> {
     let mut random = Pcg64::seed_from_u64(seed);
     let count = members.len();
-    let sort = |members: &mut Vec<Found>| members.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let sort = |members: &mut Vec<Optimum>| members.sort_by(|a, b| a.value.total_cmp(&b.value));
     sort(&mut members);
     if count < 4 {
         return members;
@@ -54,7 +54,7 @@ pub(crate) fn evolve(
                 .collect();
             let value = function(&trial, members[i].value);
             if value < members[i].value {
-                members[i] = Found { x: trial, value };
+                members[i] = Optimum { x: trial, value };
             }
         }
         sort(&mut members);
@@ -74,8 +74,8 @@ mod tests {
         };
         let start = (0..24)
             .map(|k| vec![3.0 + 0.5 * f64::from(k % 5), -4.0 + 0.4 * f64::from(k / 3)])
-            .map(|x| Found { value: hills(&x, f64::INFINITY), x });
-        let start: Vec<Found> = start.collect();
+            .map(|x| Optimum { value: hills(&x, f64::INFINITY), x });
+        let start: Vec<Optimum> = start.collect();
         // The nearest minimum has a value of 25, those beside the deepest have 1 and 2.
         let found = (1..=20).map(|seed| evolve(start.clone(), 120, seed, &mut hills)[0].value);
         let found: Vec<f64> = found.collect();
@@ -86,8 +86,10 @@ mod tests {
     #[test]
     fn the_same_seed_gives_the_same_members() {
         let mut bowl = |x: &[f64], _: f64| (x[0] - 1.0).powi(2) + (x[1] + 2.0).powi(2);
-        let start: Vec<Found> =
-            (0..8).map(|k| vec![f64::from(k), 1.0 - f64::from(k)]).map(|x| Found { value: bowl(&x, 0.0), x }).collect();
+        let start: Vec<Optimum> = (0..8)
+            .map(|k| vec![f64::from(k), 1.0 - f64::from(k)])
+            .map(|x| Optimum { value: bowl(&x, 0.0), x })
+            .collect();
         assert_eq!(evolve(start.clone(), 20, 7, &mut bowl), evolve(start, 20, 7, &mut bowl));
     }
 }

@@ -91,7 +91,7 @@ impl Family {
     /// Family of a case. Its machines are a Latin hypercube: values are uniform within a spread, normal within the
     /// interval of a fit; parameters that were not fitted have the default spread. With `tuning.corners` the worst
     /// corner of all intervals joins them.
-    pub fn of(case: &Case, tuning: &Tuning) -> Result<Self> {
+    pub fn new(case: &Case, tuning: &Tuning) -> Result<Self> {
         if let Some(file) = &tuning.draws {
             return Self::of_draws(case, tuning, file);
         }
@@ -257,7 +257,7 @@ impl Family {
 
     /// Its response, as sampled by the controller of `design`.
     pub fn plant(&self, corner: &Corner, design: &Design, corners: &[f64]) -> Result<Plant> {
-        Plant::of(&self.machine_at(corner), corner.operation(), design, corners)
+        Plant::new(&self.machine_at(corner), corner.operation(), design, corners)
     }
 
     /// Steps to these ends of each unknown, to these positions of cart and bridge, and to the loads.
@@ -298,7 +298,7 @@ impl Family {
     ) -> Result<(Corner, Margins)> {
         let corners = feedback.corners();
         let look = |corner: &Corner| -> Result<(f64, Margins)> {
-            let margins = Margins::of(&self.plant(corner, design, &corners)?, feedback);
+            let margins = Margins::new(&self.plant(corner, design, &corners)?, feedback);
             let value = badness(&margins);
             Ok((if value.is_nan() { f64::INFINITY } else { value }, margins))
         };
@@ -379,7 +379,7 @@ impl Family {
             }
         }
         best = climb(best, &all, 2, &look)?;
-        let margins = Margins::of(&self.plant(&best.0, design, &corners)?, feedback);
+        let margins = Margins::new(&self.plant(&best.0, design, &corners)?, feedback);
         Ok((best.0, margins))
     }
 }
@@ -484,7 +484,7 @@ mod tests {
     fn drawn_axes_have_one_in_every_stratum() {
         for template in [Template::Stage, Template::Gantry] {
             let case = Case::from_text("machine.toml", template.text()).unwrap();
-            let family = Family::of(&case, &Tuning::default()).unwrap();
+            let family = Family::new(&case, &Tuning::default()).unwrap();
             let drawn = &family.machines[family.loads.len()..];
             assert_eq!(drawn.len(), MACHINES);
             let ends = |places: &[f64]| [places[0], places[places.len() - 1]];

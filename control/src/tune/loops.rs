@@ -75,7 +75,7 @@ pub(super) struct Open<const N: usize> {
 }
 
 impl<const N: usize> Open<N> {
-    pub fn of(sampled: &Sampled<N>, answer: &Answer<N>, feedback: &Feedback, turn: &Turn) -> Self {
+    pub fn new(sampled: &Sampled<N>, answer: &Answer<N>, feedback: &Feedback, turn: &Turn) -> Self {
         let terms = feedback.at_turn(turn);
         let own = terms.own;
         let parts = [answer.position * terms.position, answer.slides * terms.scale, answer.current * terms.current];
@@ -309,7 +309,7 @@ fn pushed<const N: usize, const M: usize>(
     omega: f64,
 ) -> [SMatrix<Complex<f64>, M, M>; 2] {
     let answer = sampled.at(omega);
-    let open = Open::of(sampled, &answer, feedback, &Turn::new(omega, plant.every));
+    let open = Open::new(sampled, &answer, feedback, &Turn::new(omega, plant.every));
     // y = G_y D Δ⁻¹ v
     let measured = over(&(answer.position * open.own), &open.adjugate, open.difference);
     let slides = plant.kind.geometry().slides;
@@ -344,5 +344,5 @@ fn all<const N: usize>(plant: &Plant, sampled: &Sampled<N>, feedback: &Feedback)
             reference_to_slides: filled(&|slide| slides[(slide, slide)]),
         }
     };
-    plant.seen(sampled).map(|(_, answer, turn)| one(Open::of(sampled, answer, feedback, turn))).collect()
+    plant.seen(sampled).map(|(_, answer, turn)| one(Open::new(sampled, answer, feedback, turn))).collect()
 }

@@ -107,7 +107,7 @@ impl Margins {
     }
 
     /// Margins of a controller on an axis, with exact peaks and crossings.
-    pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
+    pub fn new(plant: &Plant, feedback: &Feedback) -> Self {
         let mut margins = by_drives!(plant, |sampled| {
             let mut curve = Curve::on_grid(plant, sampled, feedback);
             curve.divide();
@@ -183,8 +183,8 @@ pub struct Peaks {
 }
 
 impl Peaks {
-    /// Peaks of a controller on an axis, equal to those of [`Margins::of`].
-    pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
+    /// Peaks of a controller on an axis, equal to those of [`Margins::new`].
+    pub fn new(plant: &Plant, feedback: &Feedback) -> Self {
         let (peaks, is_stable) = by_drives!(plant, |sampled| {
             let mut curve = Curve::on_grid(plant, sampled, feedback);
             curve.divide();
@@ -219,7 +219,7 @@ pub struct Rough {
 
 impl Rough {
     /// Rough margins of a controller on an axis.
-    pub fn of(plant: &Plant, feedback: &Feedback) -> Self {
+    pub fn new(plant: &Plant, feedback: &Feedback) -> Self {
         by_drives!(plant, |sampled| Self::of_sampled(plant, sampled, feedback))
     }
 
@@ -230,7 +230,7 @@ impl Rough {
         let mut before: Option<(f64, [f64; 2])> = None;
         let breaks = breaks(feedback);
         for (omega, answer, turn) in plant.seen(sampled) {
-            let open = Open::of(sampled, answer, feedback, turn);
+            let open = Open::new(sampled, answer, feedback, turn);
             winding.go_on(omega, open.difference, turn);
             // |S|² and |T|², |x/v|² and |S|² of what follows the reference
             let squares = open.squares(breaks);
@@ -281,13 +281,13 @@ fn all_squares<const N: usize>(a: &Square<N>) -> f64 {
 
 impl<'a, const N: usize> Curve<'a, N> {
     fn on_grid(plant: &'a Plant, sampled: &'a Sampled<N>, feedback: &'a Feedback) -> Self {
-        let open = |(omega, answer, turn)| (omega, Open::of(sampled, answer, feedback, turn));
+        let open = |(omega, answer, turn)| (omega, Open::new(sampled, answer, feedback, turn));
         let points = plant.seen(sampled).map(open).collect();
         Self { plant, sampled, feedback, breaks: breaks(feedback), points }
     }
 
     fn at(&self, omega: f64) -> Open<N> {
-        Open::of(self.sampled, &self.sampled.at(omega), self.feedback, &Turn::new(omega, self.plant.every))
+        Open::new(self.sampled, &self.sampled.at(omega), self.feedback, &Turn::new(omega, self.plant.every))
     }
 
     /// Adds points between those whose L or 1 + L differ in phase by more than [`TURN`].

@@ -44,7 +44,7 @@ pub(crate) use objective::BALANCES;
 pub use objective::{AtWorst, Balance, MoveFigures, look, objective};
 pub use plant::Plant;
 pub use reference::evolved;
-pub use search::{Found, minimise};
+pub use search::{Optimum, minimise};
 pub use unknown::SPREAD;
 pub use unknown::Unknown;
 
@@ -222,7 +222,7 @@ fn beginning<'a>(case: &'a Case, tuning: &Tuning) -> Result<(&'a Design, Family,
             Error::new(format!("an effort of {} is invalid", tuning.effort)).allowed(format!("from {least} to {most}"))
         );
     }
-    Ok((design, Family::of(case, tuning)?, moves::of(case, design)?))
+    Ok((design, Family::new(case, tuning)?, moves::moves(case, design)?))
 }
 
 impl Work<'_> {
@@ -391,7 +391,7 @@ fn ended(
     let is_undamped = belt.model != BeltModel::Rigid && belt.damping.iter().all(|damping| *damping == 0.0);
     let advice = (judgement == Judgement::Worse).then(|| without_derivative(work.case, &before.design)).flatten();
     let limits = [work.tuning.sensitivity, work.tuning.complementary];
-    let certificate = Certificate::of(work.family, &after.design, limits, work.stop)?;
+    let certificate = Certificate::new(work.family, &after.design, limits, work.stop)?;
     Ok(Tuned {
         judgement,
         advice,

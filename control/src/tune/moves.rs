@@ -29,7 +29,7 @@ const WINDOW: f64 = 50e-6;
 
 /// The moves of a case, or a standard set: a short and a long move as quick as travel and limits allow, a slow
 /// reversal, and for a machine with several coordinates the long move of each alone.
-pub fn of(case: &Case, design: &Design) -> Result<Vec<Move>> {
+pub fn moves(case: &Case, design: &Design) -> Result<Vec<Move>> {
     if case.moves.is_empty() { standard(&case.machine, design) } else { Ok(case.moves.clone()) }
 }
 

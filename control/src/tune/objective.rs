@@ -152,7 +152,7 @@ impl AtWorst {
     }
 
     /// With this number of machines excluded from each figure.
-    pub fn of(seen: &[MoveFigures], left_out: usize) -> Self {
+    pub fn new(seen: &[MoveFigures], left_out: usize) -> Self {
         let worst = |of: &dyn Fn(&MoveFigures) -> f64| {
             let mut all: Vec<(f64, usize)> = seen.iter().map(of).enumerate().map(|(i, v)| (sure(v), i)).collect();
             all.sort_by(|a, b| b.0.total_cmp(&a.0));

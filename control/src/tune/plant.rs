@@ -89,7 +89,7 @@ pub(super) struct Sampled<const N: usize> {
 
 impl Plant {
     /// Samples `machine` about `operation` with the timing of `design`.
-    pub fn of(machine: &Machine, operation: Operation, design: &Design, corners: &[f64]) -> Result<Self> {
+    pub fn new(machine: &Machine, operation: Operation, design: &Design, corners: &[f64]) -> Result<Self> {
         let system = System::new(machine, operation)?;
         let model = |drive: usize| system.input(drive).discrete(design.every, Hold::Zero, design.delay);
         match machine.drives.len() {

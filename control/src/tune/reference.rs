@@ -3,7 +3,7 @@
 use super::edge::Edge;
 use super::evolution::evolve;
 use super::judged::{Judgement, Verdict};
-use super::search::Found;
+use super::search::Optimum;
 use super::tried::{Bars, Weighed};
 use super::verdict::compare;
 use super::work::{Finalist, Work};
@@ -51,9 +51,9 @@ pub fn evolved(
             work.of_moves((&finalist, 0, x), &watch, &weighed, (Edge::Eased, bar), &mut archive)
         };
         let count = finalist.powers.len();
-        let mut members: Vec<Found> = (0..MEMBERS)
+        let mut members: Vec<Optimum> = (0..MEMBERS)
             .map(|_| (0..count).map(|_| SCATTER * (2.0 * uniform(&mut random) - 1.0)).collect())
-            .map(|x: Vec<f64>| Found { value: of(&mut work, &x, f64::INFINITY), x })
+            .map(|x: Vec<f64>| Optimum { value: of(&mut work, &x, f64::INFINITY), x })
             .collect();
         let mut seed = 97 + round as u64;
         while !work.is_spent() && !stop() {

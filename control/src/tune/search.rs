@@ -4,7 +4,7 @@
 /// The result of a search.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct Found {
+pub struct Optimum {
     /// Where.
     pub x: Vec<f64>,
     /// The value there.
@@ -19,7 +19,7 @@ pub fn minimise(
     accuracy: f64,
     most: usize,
     function: &mut dyn FnMut(&[f64]) -> f64,
-) -> Found {
+) -> Optimum {
     minimise_below(start, step, accuracy, most, &mut |x, _| function(x))
 }
 
@@ -31,7 +31,7 @@ pub(crate) fn minimise_below(
     accuracy: f64,
     most: usize,
     function: &mut dyn FnMut(&[f64], f64) -> f64,
-) -> Found {
+) -> Optimum {
     let n = start.len();
     let mut asked = 0;
     let mut value = |x: &[f64], bar: f64| {
@@ -63,7 +63,7 @@ pub(crate) fn minimise_below(
                 simplex[0] = (reflected, at_reflected);
             }
             let (x, value) = simplex.swap_remove(0);
-            return Found { x, value };
+            return Optimum { x, value };
         }
         if at_reflected < simplex[0].1 {
             let expanded = along(2.0);

@@ -31,7 +31,7 @@ const NEAR: f64 = 0.2;
 /// Kind of problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Kind {
+pub enum TroubleKind {
     /// The sampled loop has poles outside the unit circle, or its oscillation grows.
     Unstable,
     /// The command is at its limit most of the time.
@@ -42,7 +42,7 @@ pub enum Kind {
     LostSteps,
 }
 
-impl Kind {
+impl TroubleKind {
     /// In a word.
     pub fn word(self) -> &'static str {
         match self {
@@ -59,7 +59,7 @@ impl Kind {
 #[non_exhaustive]
 pub struct Trouble {
     /// The kind.
-    pub kind: Kind,
+    pub kind: TroubleKind,
     /// Frequency of its oscillation, Hz, if any.
     pub frequency: Option<f64>,
     /// Cause, in words.
@@ -88,19 +88,19 @@ pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move)
     // reported.
     let swings = is_saturated || grows || swing.late > LEAST * limit && cycles;
     let (kind, frequency) = match model {
-        Some(hertz) if swings => (Kind::Unstable, Some(hertz)),
-        _ if grows => (Kind::Unstable, seen),
-        _ if is_saturated => (Kind::Saturated, seen),
-        _ if loud => (Kind::Howling, seen),
+        Some(hertz) if swings => (TroubleKind::Unstable, Some(hertz)),
+        _ if grows => (TroubleKind::Unstable, seen),
+        _ if is_saturated => (TroubleKind::Saturated, seen),
+        _ if loud => (TroubleKind::Howling, seen),
         _ => return None,
     };
     let cause = cause(machine, design, kind, frequency, at);
     let place = frequency.map_or(String::new(), |hertz| format!(" at {hertz:.1} Hz"));
     let what = match kind {
-        Kind::Unstable => format!("the loop is unstable and oscillates{place}"),
-        Kind::Saturated if frequency.is_some() => format!("the command is saturated and oscillates{place}"),
-        Kind::Saturated => "the command is saturated".into(),
-        Kind::Howling | Kind::LostSteps => format!("the loop howls{place}"),
+        TroubleKind::Unstable => format!("the loop is unstable and oscillates{place}"),
+        TroubleKind::Saturated if frequency.is_some() => format!("the command is saturated and oscillates{place}"),
+        TroubleKind::Saturated => "the command is saturated".into(),
+        TroubleKind::Howling | TroubleKind::LostSteps => format!("the loop howls{place}"),
     };
     let held = if limited > 0 { format!("; {limited} of {samples} samples at the limit") } else { String::new() };
     Some(Trouble { kind, frequency, words: format!("{what}: {cause}{held}"), cause })
@@ -126,14 +126,14 @@ fn lost_steps(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move) 
         false => "its torque does not suffice for this speed and acceleration: `taut plan` finds what does",
     };
     let words = format!("{}: {cause}", lost.join(", and "));
-    Some(Trouble { kind: Kind::LostSteps, frequency: None, words, cause: cause.into() })
+    Some(Trouble { kind: TroubleKind::LostSteps, frequency: None, words, cause: cause.into() })
 }
 
 /// Frequency of oscillation of an unstable sampled loop, Hz; none also for nonlinear structures.
 fn unstable(machine: &Machine, design: &Design, at: Operation) -> Option<f64> {
     let feedback = Feedback::new(design, machine).ok().filter(Feedback::is_linear)?;
-    let plant = Plant::of(machine, at, design, &feedback.corners()).ok()?;
-    let margins = Margins::of(&plant, &feedback);
+    let plant = Plant::new(machine, at, design, &feedback.corners()).ok()?;
+    let margins = Margins::new(&plant, &feedback);
     (!margins.stable).then_some(margins.at / (2.0 * PI))
 }
 
@@ -147,11 +147,11 @@ pub(super) fn limit(machine: &Machine, design: &Design) -> Option<f64> {
     [design.limit, amplifier].into_iter().flatten().reduce(f64::min)
 }
 
-fn cause(machine: &Machine, design: &Design, kind: Kind, frequency: Option<f64>, at: Operation) -> String {
+fn cause(machine: &Machine, design: &Design, kind: TroubleKind, frequency: Option<f64>, at: Operation) -> String {
     let Some(hertz) = frequency else {
         return match kind {
-            Kind::Saturated => "the move asks for more than the limit of the command allows".into(),
-            Kind::Unstable | Kind::Howling | Kind::LostSteps => "its gains are too high".into(),
+            TroubleKind::Saturated => "the move asks for more than the limit of the command allows".into(),
+            TroubleKind::Unstable | TroubleKind::Howling | TroubleKind::LostSteps => "its gains are too high".into(),
         };
     };
     let places = travel(machine, at, &[at.position]).unwrap_or_default();

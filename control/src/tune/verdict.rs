@@ -50,7 +50,7 @@ impl Verdict {
     pub(super) fn watch(&self, work: &Work) -> Watch {
         let count = work.stages.len();
         let seen: Vec<Vec<MoveFigures>> = self.moves.iter().map(|one| one.seen[..count].to_vec()).collect();
-        Watch::of(&seen, work.family.left_out(count))
+        Watch::new(&seen, work.family.left_out(count))
     }
 
     /// Machines on which a figure exceeds its previous worst case: for each move the two worst, and one more for each
@@ -126,7 +126,7 @@ impl Work<'_> {
     fn judged(&self, design: &Design, (bar, order): (f64, &[usize])) -> Result<Option<Verdict>> {
         let feedback = self.feedback(design)?;
         let corners = feedback.corners();
-        let nominal = Margins::of(&self.family.plant(&self.family.nominal(), design, &corners)?, &feedback);
+        let nominal = Margins::new(&self.family.plant(&self.family.nominal(), design, &corners)?, &feedback);
         let (place, excess, unstable) = self.worst(&feedback);
         let mut at_corner = None;
         let mut machines = self.family.machines.clone();
@@ -147,7 +147,7 @@ impl Work<'_> {
             let (machine, until, window) = (&self.case.machine, motion.until, motion.window);
             let (profiles, solver) = (&motion.profiles, Solver::for_machine(machine));
             let own = closed_loop(&Setup { machine, model: machine, design, profiles, until, window, solver })?;
-            let at_worst = AtWorst::of(&seen, left_out);
+            let at_worst = AtWorst::new(&seen, left_out);
             moves.push(MoveVerdict {
                 name: motion.name.clone(),
                 window: motion.window,
@@ -201,7 +201,7 @@ impl Work<'_> {
             found.push((place, figures));
             if bar.is_finite() && found.len() > left_out {
                 let worst: Vec<AtWorst> =
-                    (0..self.moves.len()).map(|k| AtWorst::of(&of(&found, k), left_out)).collect();
+                    (0..self.moves.len()).map(|k| AtWorst::new(&of(&found, k), left_out)).collect();
                 if objective(cost, &BALANCES[1], self.moves, &self.asked, &worst) > bar {
                     return Ok(None);
                 }

@@ -25,7 +25,7 @@ const FIGURES: [fn(&MoveFigures) -> f64; 2] = [|seen| seen.error, |seen| seen.se
 
 impl Watch {
     /// Machines that are worst in a figure: `left_out` plus a fixed number for each.
-    pub fn of(seen: &[Vec<MoveFigures>], left_out: usize) -> Self {
+    pub fn new(seen: &[Vec<MoveFigures>], left_out: usize) -> Self {
         let of_move = |seen: &Vec<MoveFigures>| {
             let mut axes: Vec<usize> = Vec::new();
             let orders = FIGURES.map(|figure| order(seen, figure));

@@ -116,7 +116,7 @@ mod tests {
         let case = pid();
         let tuning = case.tune.clone().unwrap_or_default();
         let file = case.controller.clone().unwrap();
-        let family = Family::of(&case, &tuning).unwrap();
+        let family = Family::new(&case, &tuning).unwrap();
         let mut work = Work::new(&case, &family, &tuning, &case.moves, &file, &|| false).unwrap();
         assert!(work.passes(&file).unwrap());
         // Slow enough to keep the limits: a third of the speed.

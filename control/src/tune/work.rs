@@ -140,7 +140,7 @@ impl<'a> Work<'a> {
     /// unstable machines.
     pub fn worst(&self, feedback: &Feedback) -> (usize, f64, usize) {
         let (ms, mt) = (self.tuning.sensitivity, self.tuning.complementary);
-        let peaks = self.plants.iter().map(|plant| Peaks::of(plant, feedback));
+        let peaks = self.plants.iter().map(|plant| Peaks::new(plant, feedback));
         let mut all: Vec<(usize, f64)> = peaks.map(|peaks| peaks.excess(ms, mt)).enumerate().collect();
         let unstable = all.iter().filter(|(_, excess)| excess.is_infinite()).count();
         all.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -151,7 +151,7 @@ impl<'a> Work<'a> {
     /// Each margin of a controller at its worst: without the excluded machines, and on the worst corner, if that is
     /// known.
     pub fn margins_at_worst(&self, feedback: &Feedback, corner: Option<Margins>) -> Option<Margins> {
-        let all: Vec<Margins> = self.plants.iter().map(|plant| Margins::of(plant, feedback)).collect();
+        let all: Vec<Margins> = self.plants.iter().map(|plant| Margins::new(plant, feedback)).collect();
         let drawn = Margins::at_worst(&all, self.family.left_out(all.len()))?;
         Margins::at_worst(&[Some(drawn), corner].into_iter().flatten().collect::<Vec<_>>(), 0)
     }
@@ -182,7 +182,7 @@ impl<'a> Work<'a> {
         let Ok(feedback) = self.feedback(design) else { return (f64::INFINITY, f64::INFINITY) };
         let (mut most, mut slow) = (0.0_f64, 0.0_f64);
         for plant in self.set.iter().map(|&place| &self.plants[place]).chain(&self.more) {
-            let rough = Rough::of(plant, &feedback);
+            let rough = Rough::new(plant, &feedback);
             most = most.max(rough.peaks.excess(self.tuning.sensitivity, self.tuning.complementary));
             // Responses to steps of command and reference: the first alone could be optimised without a position gain.
             slow = slow.max(rough.disturbance * rough.following);

@@ -436,6 +436,12 @@ pub(crate) const MORE_THAN_NOISE: f64 = 1.2;
 /// `residuals_far_above_the_noise_are_reported`.
 pub(crate) const FAR_BEYOND_NOISE: f64 = 20.0;
 
+/// Residuals beyond this multiple of the noise leave undecided which belt of a gantry is looser.
+///
+/// Unit: 1. Source: chosen: right models leave less, motors with wrong constants or a wrong delay 14 times and more.
+/// Test: `belts_of_a_doubtful_fit_are_undecided`.
+pub(crate) const BELTS_DOUBTFUL: f64 = 5.0;
+
 /// Costs that differ by less are taken for those of one minimum.
 ///
 /// Unit: 1. Source: chosen: a rough search ends within a few per mille of its minimum. Test:

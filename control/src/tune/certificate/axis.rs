@@ -84,7 +84,7 @@ fn expanded(gain: f64, roots: &[Complex<f64>]) -> [Vec<f64>; 2] {
 
 impl Sampler<'_> {
     /// Coefficients of d and of each n, and their magnitudes.
-    fn of(&self, corner: &Corner) -> Result<Vec<[Vec<f64>; 2]>> {
+    fn sample(&self, corner: &Corner) -> Result<Vec<[Vec<f64>; 2]>> {
         let machine = self.family.machine_at(corner);
         let system = StateSpace::new(&machine, corner.operation())?;
         let weight = System::denominator(&machine, corner.operation()) / self.weight;
@@ -106,7 +106,7 @@ impl Sampler<'_> {
     /// Channels of a machine, or none if it has more than these.
     fn channels(&self, corner: &Corner, orders: &[usize]) -> Result<Option<Vec<f64>>> {
         let mut channels = Vec::new();
-        for ([mut values, _], order) in self.of(corner)?.into_iter().zip(orders) {
+        for ([mut values, _], order) in self.sample(corner)?.into_iter().zip(orders) {
             if values.len() > *order {
                 return Ok(None);
             }
@@ -119,7 +119,7 @@ impl Sampler<'_> {
 
 impl<'a> Axis<'a> {
     /// The axis of a family with the timing of a design; the inner error is the reason why it has no polynomials.
-    pub fn of(
+    pub fn new(
         family: &'a Family,
         design: &Design,
         has_scale: bool,
@@ -128,7 +128,7 @@ impl<'a> Axis<'a> {
         let nominal = family.nominal();
         let weight = System::denominator(&family.machine_at(&nominal), nominal.operation());
         let sampler = Sampler { family, unit: PI / design.every, has_scale, weight };
-        let parts = sampler.of(&nominal)?;
+        let parts = sampler.sample(&nominal)?;
         let orders: Vec<usize> = parts.iter().map(|[values, _]| values.len()).collect();
         let magnitudes: Vec<f64> = parts.into_iter().flat_map(|[_, sizes]| sizes).collect();
         let channels = magnitudes.len();

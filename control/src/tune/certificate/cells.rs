@@ -56,7 +56,7 @@ pub(super) struct Table {
 }
 
 impl Table {
-    pub fn of(polynomials: &Tensor, axis: &Axis) -> Self {
+    pub fn new(polynomials: &Tensor, axis: &Axis) -> Self {
         let magnitudes = &axis.magnitudes;
         let (channels, count) = (polynomials.channels, polynomials.count());
         let size = polynomials.shape.len();

@@ -78,7 +78,7 @@ impl Certificate {
 
     /// The certificate of a controller over a family of axes, with these limits of M_s and M_t. Deterministic; `stop`
     /// ends it early.
-    pub fn of(family: &Family, design: &Design, limits: [f64; 2], stop: &dyn Fn() -> bool) -> Result<Self> {
+    pub fn new(family: &Family, design: &Design, limits: [f64; 2], stop: &dyn Fn() -> bool) -> Result<Self> {
         let feedback = Feedback::new(design, &family.machine)?;
         if family.machine.drives.len() > 1 {
             return Ok(Self::none("several drives are not covered"));
@@ -99,7 +99,7 @@ impl Certificate {
         if feedback.uses_current() {
             return because("a controller that uses the measured current is not covered");
         }
-        let axis = match Axis::of(family, design, feedback.uses_scale(), stop)? {
+        let axis = match Axis::new(family, design, feedback.uses_scale(), stop)? {
             Ok(axis) => axis,
             Err(reason) => return because(&reason),
         };
@@ -134,7 +134,7 @@ impl Certificate {
         if low == 1.0 {
             // The least bounds that can be shown, each alone.
             let worst = Search { family, design, feedback: &feedback, limits }.worst(1.0, &family.nominal())?;
-            let worst = Margins::of(&family.plant(&worst.0, design, &feedback.corners())?, &feedback);
+            let worst = Margins::new(&family.plant(&worst.0, design, &feedback.corners())?, &feedback);
             let bound = |place: usize, least: f64| {
                 let (mut low, mut high) = (least.max(1.0).min(limits[place]), limits[place]);
                 for _ in 0..PROOFS / 2 {
@@ -163,7 +163,7 @@ fn proven(question: &Question, polynomials: Tensor, stop: &dyn Fn() -> bool) -> 
     let mut boxes = vec![(polynomials, intervals)];
     let mut budget = BUDGET;
     while let Some((polynomials, mut waiting)) = boxes.pop() {
-        let table = Table::of(&polynomials, question.axis);
+        let table = Table::new(&polynomials, question.axis);
         let mut votes = vec![0.0; polynomials.shape.len()];
         let mut left = Vec::new();
         budget = budget.saturating_sub(polynomials.values.len() / 8);
@@ -211,7 +211,7 @@ impl Search<'_> {
     /// Largest peak relative to its limit.
     fn excess(&self, corner: &Corner) -> Result<f64> {
         let plant = self.family.plant(corner, self.design, &self.feedback.corners())?;
-        Ok(Peaks::of(&plant, self.feedback).excess(self.limits[0], self.limits[1]))
+        Ok(Peaks::new(&plant, self.feedback).excess(self.limits[0], self.limits[1]))
     }
 
     /// A corner whose largest deviation is `factor` instead.
@@ -322,7 +322,7 @@ impl Search<'_> {
 
     fn violation(&self, corner: Corner, factor: f64) -> Result<Option<Violation>> {
         let plant = self.family.plant(&corner, self.design, &self.feedback.corners())?;
-        let margins = Margins::of(&plant, self.feedback);
+        let margins = Margins::new(&plant, self.feedback);
         Ok(Some(Violation { factor, corner, margins }))
     }
 }

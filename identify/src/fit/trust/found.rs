@@ -6,6 +6,7 @@ use super::finding::{Finding, Grade};
 use super::identify::Identifiability;
 use super::scores::LogFit;
 use crate::control::belts::Belts;
+use crate::fit::limits::BELTS_DOUBTFUL;
 use crate::fit::noise::Wave;
 use crate::fit::search::point::{Ending, Strategy};
 use crate::fit::search::starts::Work;
@@ -42,6 +43,8 @@ pub struct Fit {
     pub waves: Vec<Wave>,
     /// Outputs whose noise oscillates, with its frequency, Hz.
     pub(crate) oscillations: Vec<(Quantity, f64)>,
+    /// The residuals of the worst output, as a multiple of the noise of the logs; 0 without a search.
+    pub(crate) times_noise: f64,
     /// Findings on logs and search, warnings first.
     pub findings: Vec<Finding>,
     /// The variables of the search where it ended.
@@ -135,13 +138,15 @@ impl Fit {
         }
     }
 
-    /// The comparison of the belts of two drives, undetermined if the fit is doubtful for another reason than a missing
-    /// element, for which intervals are widened; `None` for a machine with one drive, or if no free parameter changes
+    /// The comparison of the belts of two drives, undetermined if the fit is doubtful for another reason than residuals a
+    /// little above the noise, or a missing element, for which intervals are widened; `None` for a machine with one drive, or if no free parameter changes
     /// the belts.
     pub fn belts(&self) -> Option<Belts> {
         let stated = self.identifiability.as_ref()?.belts.as_ref()?.belts.clone();
         let element = self.cause.as_ref().map(|cause| cause.key);
-        let is_doubtful = self.warnings().any(|finding| Some(finding.code) != element);
+        let is_far = self.times_noise > BELTS_DOUBTFUL;
+        let mut warnings = self.warnings().filter(|finding| Some(finding.code) != element);
+        let is_doubtful = warnings.any(|finding| finding.code != "noise" || is_far);
         Some(if is_doubtful { Belts { error: f64::INFINITY, ..stated } } else { stated })
     }
 

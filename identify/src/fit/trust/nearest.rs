@@ -52,6 +52,7 @@ impl Settled<'_> {
         let surveys = trials::surveys(case, plan, &self.searched);
         let judged = self.judged(case, plan, &surveys);
         let mut fit = result(&self.searched, judged.as_ref());
+        fit.times_noise = self.searched.times_noise().map(|(_, times)| times).fold(0.0, f64::max);
         fit.findings = findings(case, plan, &self.searched, &fit, &surveys);
         Assessed { fit, surveys, judged }
     }

@@ -119,6 +119,7 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         cause: judged.and_then(|judged| judged.cause.clone()),
         waves: judged.iter().flat_map(|judged| &judged.spreads).flat_map(|spread| spread.waves.clone()).collect(),
         oscillations: judged.map_or(Vec::new(), |judged| judged.oscillations(problem)),
+        times_noise: 0.0,
         findings: Vec::new(),
         point: best.x.clone(),
         ending: best.ending,
