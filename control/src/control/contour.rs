@@ -9,8 +9,8 @@ use crate::signal::profile::{Passage, Profile};
 use crate::solve::{Curve, Polynomial, TERMS};
 use std::f64::consts::TAU;
 
-/// Along the path, the nearest point of a slide is at most this many times its largest distance from the reference away
-/// from the reference: on a half circle π/2 times, around a right angle √2 times.
+/// Along the path, the nearest point of a slide is at most this many times its largest distance from the profiles, without
+/// shaper, away from them: on a half circle π/2 times, around a right angle √2 times.
 const LAG: f64 = 2.0;
 
 /// The same, least, m.
@@ -29,6 +29,8 @@ pub(super) struct Contour {
 struct Course {
     /// s
     begin: f64,
+    /// The coordinate that moves farther.
+    passage: Passage,
     /// Length of the path up to it, and its own, m.
     before: f64,
     length: f64,
@@ -73,10 +75,7 @@ impl Course {
     fn nearest(&self, point: [f64; 2], [least, most]: [f64; 2]) -> Foot {
         let (share, left) = self.beside(point);
         let is_beside = (least..=most).contains(&share);
-        let far = |share: f64| {
-            let end = self.at(share);
-            (point[0] - end[0]).hypot(point[1] - end[1])
-        };
+        let far = |share: f64| far(point, self.at(share));
         let (share, distance) = match is_beside {
             true => (share, left),
             false if far(least) < far(most) => (least, far(least).copysign(left)),
@@ -108,7 +107,9 @@ impl Contour {
             let (from, to) = ([x.from, y.from], [x.to, y.to]);
             let arc = x.turn.zip(y.turn.map(|turn| turn.center));
             let length = arc.map_or((to[0] - from[0]).hypot(to[1] - from[1]), |(turn, _)| turn.length);
-            let course = Course { begin: x.begin, before, length, from, to, arc };
+            let is_x = arc.is_some() || (x.to - x.from).abs() >= (y.to - y.from).abs();
+            let passage = if is_x { x.clone() } else { y.clone() };
+            let course = Course { begin: x.begin, passage, before, length, from, to, arc };
             before += length;
             course
         };
@@ -131,15 +132,17 @@ impl Contour {
                 best = Some(foot);
             }
         }
-        let off = (point[0] - self.start[0]).hypot(point[1] - self.start[1]);
-        best.unwrap_or(Foot { distance: off, along: 0.0, leg: None, is_beside: false })
+        best.unwrap_or(Foot { distance: far(point, self.start), along: 0.0, leg: None, is_beside: false })
     }
 
-    /// Length of the path up to a reference at `time`, m.
-    fn reached(&self, time: f64, reference: [f64; 2]) -> f64 {
+    /// Where the profiles are at `time`, s, and the length of the path up to there, m.
+    fn reached(&self, time: f64) -> ([f64; 2], f64) {
         let now = self.legs.partition_point(|leg| leg.begin <= time);
         let leg = now.checked_sub(1).map(|number| &self.legs[number]);
-        leg.map_or(0.0, |leg| leg.before + leg.beside(reference).0.clamp(0.0, 1.0) * leg.length)
+        leg.map_or((self.start, 0.0), |leg| {
+            let share = leg.passage.share(time);
+            (leg.at(share), leg.before + share * leg.length)
+        })
     }
 
     /// Distance from a straight leg of a point that moves along these polynomials; none for an arc.
@@ -161,7 +164,7 @@ impl Contour {
 /// Follows a point along a path: other parts of the path that pass nearby (lines of a hatching, crossings) do not count.
 pub(super) struct Follower {
     path: Contour,
-    /// Largest distance from the reference so far, m.
+    /// Largest distance from the profiles so far, m.
     lag: f64,
 }
 
@@ -170,22 +173,23 @@ impl Follower {
         Self { path, lag: 0.0 }
     }
 
-    /// Nearest point of the path at `time`, s, to a point that follows a reference.
-    pub fn nearest(&self, time: f64, point: [f64; 2], reference: [f64; 2]) -> Foot {
-        let reach = LAG * self.lag_with(point, reference) + LEAST;
-        let at = self.path.reached(time, reference);
-        self.path.nearest(time, point, [at - reach, at + reach])
+    /// Nearest point of the path at `time`, s.
+    pub fn nearest(&self, time: f64, point: [f64; 2]) -> Foot {
+        let (reference, along) = self.path.reached(time);
+        let reach = LAG * self.lag.max(far(point, reference)) + LEAST;
+        self.path.nearest(time, point, [along - reach, along + reach])
     }
 
     /// The same; the point has come there.
-    pub fn follow(&mut self, time: f64, point: [f64; 2], reference: [f64; 2]) -> Foot {
-        self.lag = self.lag_with(point, reference);
-        self.nearest(time, point, reference)
+    pub fn follow(&mut self, time: f64, point: [f64; 2]) -> Foot {
+        self.lag = self.lag.max(far(point, self.path.reached(time).0));
+        self.nearest(time, point)
     }
+}
 
-    fn lag_with(&self, point: [f64; 2], reference: [f64; 2]) -> f64 {
-        self.lag.max((point[0] - reference[0]).hypot(point[1] - reference[1]))
-    }
+/// Distance between two points, m.
+fn far(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
 /// Gathers the distance from a path.
@@ -211,11 +215,11 @@ impl ContourGauge {
     }
 
     /// Adds the motion on a part of a curve; exact if one straight leg is the nearest on all of it.
-    pub fn track(&mut self, curve: &Curve, part: (f64, f64), [places, references]: [&[Polynomial]; 2]) {
+    pub fn track(&mut self, curve: &Curve, part: (f64, f64), places: &[Polynomial]) {
         let time = |s: f64| curve.begin + s * curve.length;
-        let point = |of: &[Polynomial], s: f64| [of[0].at(s), of[1].at(s)];
+        let point = |s: f64| [places[0].at(s), places[1].at(s)];
         let follower = &self.follower;
-        let at = |s: f64| follower.nearest(time(s), point(places, s), point(references, s));
+        let at = |s: f64| follower.nearest(time(s), point(s));
         let spread = |k: usize| part.0 + (part.1 - part.0) * k as f64 / (PLACES - 1) as f64;
         let seen: [_; PLACES] = std::array::from_fn(|k| at(spread(k)));
         let leg = seen[0].leg;
@@ -236,12 +240,12 @@ impl ContourGauge {
                 }
             }
         }
-        self.follower.follow(time(part.1), point(places, part.1), point(references, part.1));
+        self.follower.follow(time(part.1), point(part.1));
     }
 
     /// The run has ended there.
-    pub fn end(&mut self, time: f64, point: [f64; 2], reference: [f64; 2]) {
-        self.seen.last = self.follower.follow(time, point, reference).distance;
+    pub fn end(&mut self, time: f64, point: [f64; 2]) {
+        self.seen.last = self.follower.follow(time, point).distance;
     }
 
     /// Contour error of a run that ended at `end`, s.
@@ -293,10 +297,10 @@ mod tests {
             for k in 0..=10_000 {
                 let time = profiles[0].end() * f64::from(k) / 1e4;
                 let at = |time: f64| profiles.iter().map(|profile| profile.at(time).position).collect::<Vec<_>>();
-                let (reference, lagging) = (at(time), at(time - 2e-3));
+                let lagging = at(time - 2e-3);
                 let wave = 4e-4 * (300.0 * time).sin();
                 let point = [lagging[0], lagging[1] + wave];
-                let foot = follower.follow(time, point, [reference[0], reference[1]]);
+                let foot = follower.follow(time, point);
                 // To the left of the way back is down.
                 let way = [lagging[0], 0.05 - lagging[0]].into_iter().fold(f64::MAX, f64::min);
                 let (on_first, on_last) = (time < back, time > back + 2e-3);

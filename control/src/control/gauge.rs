@@ -308,7 +308,7 @@ impl<'a> Gauge<'a> {
             drive.squares[0] += curve.length * square(&following, part);
         }
         if let Some(contour) = &mut self.contour {
-            contour.track(curve, part, [&places, references]);
+            contour.track(curve, part, &places);
         }
     }
 
@@ -427,7 +427,7 @@ impl Observe for Gauge<'_> {
             drive.seen.following.last = radius * state.position[drive.pulley] - y;
         }
         if let (Some(contour), [x, y]) = (&mut self.contour, &self.loads[..]) {
-            contour.end(time, [x.body, y.body].map(|body| state.position[body]), [references[0], references[1]]);
+            contour.end(time, [x.body, y.body].map(|body| state.position[body]));
         }
     }
 }

@@ -51,11 +51,8 @@ impl Wide {
         let away: Option<Vec<f64>> = match (&mut self.contour, &self.loads[..]) {
             (Some(contour), [x, y]) => {
                 let (x, y) = (place(x), place(y));
-                let follow = |(row, time): (usize, &f64)| {
-                    let reference = [references[0][row], references[1][row]];
-                    contour.follow(*time, [x[row], y[row]], reference).distance
-                };
-                Some(time.iter().enumerate().map(follow).collect())
+                let points = x.iter().zip(y).zip(time);
+                Some(points.map(|((x, y), time)| contour.follow(*time, [*x, *y]).distance).collect())
             }
             _ => None,
         };

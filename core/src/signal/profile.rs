@@ -276,6 +276,16 @@ impl Passage {
         [low.min(ends[0]), high.max(ends[1])]
     }
 
+    /// The share of its length that is passed at this time, s; of a coordinate that stands still 0 or 1.
+    pub fn share(&self, time: f64) -> f64 {
+        let t = time - self.begin;
+        match t {
+            t if t <= 0.0 => 0.0,
+            t if t >= self.duration() => 1.0,
+            t => (self.stroke.reference(t, false).position / self.stroke.distance).clamp(0.0, 1.0),
+        }
+    }
+
     /// The direction in which it comes to its end, ±1, and from when on (s) a place beyond the end has been passed
     /// over; 0 of one that does not move.
     pub fn approach(&self) -> (f64, f64) {
