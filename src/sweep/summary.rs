@@ -60,7 +60,10 @@ impl LostShare {
         let middle = share + z * z / (2.0 * n);
         let half = z * (share * (1.0 - share) / n + z * z / (4.0 * n * n)).sqrt();
         let at = |value: f64| (value / (1.0 + z * z / n)).clamp(0.0, 1.0);
-        Self { lost, runs, interval: [at(middle - half), at(middle + half)] }
+        // Exactly 0 and 1 at the ends, but for rounding.
+        let low = if lost == 0 { 0.0 } else { at(middle - half) };
+        let high = if lost == runs { 1.0 } else { at(middle + half) };
+        Self { lost, runs, interval: [low, high] }
     }
 
     /// Share of the runs out of step.
