@@ -1,5 +1,5 @@
-//! Arithmetic for control laws. A law is written once; it runs on numbers ([`Evaluation`]), gives its derivatives ([`Slope`]),
-//! and is exported as a program (`export::program`).
+//! Arithmetic for control laws. A law is written once; it runs on numbers ([`Evaluation`]), gives its derivatives
+//! ([`Slope`]), and is exported as a program (`export::program`).
 
 use std::fmt::Debug;
 use std::ops::{Add, Div, Mul, Neg, Sub};

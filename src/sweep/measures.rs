@@ -124,10 +124,8 @@ pub fn of_move(kind: MachineKind, has_steppers: bool) -> Vec<Measure> {
         };
         let parts = match per {
             Per::Load => &loads,
-            Per::Drive => &drives,
-            Per::Stepper if has_steppers => &drives,
-            Per::Stepper => return Vec::new(),
-            Per::Steppers if !has_steppers => return Vec::new(),
+            Per::Stepper | Per::Steppers if !has_steppers => return Vec::new(),
+            Per::Drive | Per::Stepper => &drives,
             Per::Plane if loads.len() < 2 => return Vec::new(),
             Per::Whole | Per::Plane | Per::Steppers => return vec![one(0, Label { key: "", name: "" }, 0)],
         };

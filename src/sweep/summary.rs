@@ -44,7 +44,7 @@ pub struct Shown {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct LostShare {
-    /// Runs out of step, and runs in all.
+    /// Runs out of step.
     pub lost: usize,
     /// All runs.
     pub runs: usize,

@@ -9,8 +9,8 @@ use crate::signal::profile::{Passage, Profile};
 use crate::solve::{Curve, Polynomial, TERMS};
 use std::f64::consts::TAU;
 
-/// Along the path, the nearest point of a slide is at most this many times its largest distance from the profiles, without
-/// shaper, away from them: on a half circle π/2 times, around a right angle √2 times.
+/// Along the path, the nearest point of a slide is at most this many times its largest distance from the profiles,
+/// without shaper, away from them: on a half circle π/2 times, around a right angle √2 times.
 const LAG: f64 = 2.0;
 
 /// The same, least, m.
@@ -161,7 +161,8 @@ impl Contour {
     }
 }
 
-/// Follows a point along a path: other parts of the path that pass nearby (lines of a hatching, crossings) do not count.
+/// Follows a point along a path: other parts of the path that pass nearby (lines of a hatching, crossings) do not
+/// count.
 pub(super) struct Follower {
     path: Contour,
     /// Largest distance from the profiles so far, m.

@@ -138,9 +138,9 @@ impl Fit {
         }
     }
 
-    /// The comparison of the belts of two drives, undetermined if the fit is doubtful for another reason than residuals a
-    /// little above the noise, or a missing element, for which intervals are widened; `None` for a machine with one drive, or if no free parameter changes
-    /// the belts.
+    /// The comparison of the belts of two drives; `None` for a machine with one drive, or if no free parameter changes
+    /// them. Undetermined if the fit is doubtful for another reason than residuals a little above the noise, or a
+    /// missing element, for which intervals are widened.
     pub fn belts(&self) -> Option<Belts> {
         let stated = self.identifiability.as_ref()?.belts.as_ref()?.belts.clone();
         let element = self.cause.as_ref().map(|cause| cause.key);
