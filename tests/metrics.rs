@@ -7,10 +7,11 @@ use proptest::prelude::*;
 use taut::case::Experiment;
 use taut::friction::{Friction, Law, Shape};
 use taut::machine::{AmplifierMode, BeltModel, GearPlay, Machine};
+use taut::mechanism::{Mode, State};
 use taut::metrics::{Balance, Meter, Metrics, OfSpan, Peak, balanced_speed};
 use taut::polyline::Polyline;
 use taut::signal::{Signal, Slot};
-use taut::solve::{Ending, Flow, Method, Solution, Solver, stream_observed};
+use taut::solve::{Curve, Ending, Flow, Gap, Method, Observe, QUANTITIES, Solution, Solver, stream_observed};
 use taut::trajectory::Trajectory;
 
 /// Runs it with a meter beside.
@@ -60,6 +61,67 @@ fn largest_rows(machine: &Machine, trajectory: &Trajectory) -> Vec<f64> {
     columns.extend([apart(&p1, r, &x, 1.0), get("span1_force"), apart(&x, 1.0, &p3, r), get("span2_force")]);
     columns.extend([apart(&p3, r, &p1, r), get("span3_force")]);
     columns.iter().map(|column| column.iter().fold(0.0, |most: f64, value| most.max(value.abs()))).collect()
+}
+
+/// Collects the curves of a run: of all of it at once, or each between two readings.
+struct Curves {
+    sees_all: bool,
+    seen: Vec<Curve>,
+}
+
+impl Observe for Curves {
+    fn pass(&mut self, _: &Gap) -> bool {
+        true
+    }
+
+    fn see(&mut self, curve: &Curve) {
+        self.seen.push(*curve);
+    }
+
+    fn sees_all(&self) -> bool {
+        self.sees_all
+    }
+
+    fn end(&mut self, _: f64, _: &State, _: &Mode) {}
+}
+
+proptest! {
+    #![proptest_config(random::cases(64))]
+    /// Where all of a run is shown, curves come from matrices, otherwise from derivatives at both ends.
+    #[test]
+    fn curves_by_matrices_are_those_by_derivatives(
+        machine in random::equipped(Dry::Any),
+        input in random::input(),
+        every in prop_oneof![Just(1e-3), Just(7e-3)],
+    ) {
+        let experiment = Experiment { every, ..experiment(input, 0.05) };
+        let curves = |sees_all: bool| {
+            let mut curves = Curves { sees_all, seen: Vec::new() };
+            let run = stream_observed(&machine, &experiment, Solver::Exact, &mut curves, &mut |_| Flow::Continue);
+            run.unwrap();
+            curves.seen
+        };
+        let (by_matrices, by_derivatives) = (curves(true), curves(false));
+        let mut scale = [0.0_f64; QUANTITIES];
+        for curve in &by_derivatives {
+            scale.iter_mut().zip(curve.at(1.0)).for_each(|(scale, value)| *scale = scale.max(value.abs()));
+        }
+        let mut compared = 0;
+        for curve in &by_matrices {
+            for s in [0.0, 0.3, 0.5, 0.9, 1.0] {
+                let time = curve.begin + s * curve.length;
+                // At its end, a curve meets the next one with another input or mode.
+                let share = |other: &Curve| (time - other.begin) / other.length;
+                let is_inside = |other: &&Curve| (1e-6..1.0 - 1e-6).contains(&share(other));
+                let Some(other) = by_derivatives.iter().find(is_inside) else { continue };
+                for ((one, two), scale) in curve.at(s).iter().zip(other.at(share(other))).zip(scale) {
+                    prop_assert!((one - two).abs() <= 1e-8 * scale, "at {time}: {one} and {two} of {scale}");
+                }
+                compared += 1;
+            }
+        }
+        prop_assert!(compared > 0 || by_matrices.is_empty(), "{} curves", by_matrices.len());
+    }
 }
 
 proptest! {

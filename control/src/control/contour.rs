@@ -1,12 +1,12 @@
 //! Distances from a path in a plane.
 
 use super::figures::Deviation;
-use super::quadrature::{integral, larger};
+use super::quadrature::larger;
 use crate::golden;
 use crate::metrics::Peak;
 use crate::signal::arc::Turn;
 use crate::signal::profile::{Passage, Profile};
-use crate::solve::{Curve, Polynomial, TERMS};
+use crate::solve::{Curve, Polynomial, TERMS, integral};
 use std::f64::consts::TAU;
 
 /// Along the path, the nearest point of a slide is at most this many times its largest distance from the profiles,

@@ -2,14 +2,14 @@
 
 use super::contour::{Contour, ContourGauge};
 use super::figures::{DriveFigures, Figures, LoadFigures, is_made};
-use super::quadrature::{at_places, integral, larger, product, shifted, slope, square};
+use super::quadrature::{larger, shifted, slope, square};
 use super::sampled::SLIDES;
 use crate::case::Experiment;
 use crate::machine::{Machine, SlideAt};
 use crate::mechanism::{Limit, Mechanism, Mode, Shown, State};
 use crate::metrics::{Held, Meter, Metrics, Peak, Sought};
 use crate::signal::profile::{Passage, Profile};
-use crate::solve::{self, Curve, Gap, Observe, Polynomial, TERMS};
+use crate::solve::{self, Curve, Gap, Observe, Polynomial, TERMS, integral, integral_of_product};
 
 /// A machine, and its mechanism with the readings of a move.
 pub(super) fn read(machine: &Machine) -> (&Machine, Mechanism) {
@@ -179,6 +179,9 @@ impl SpanGauge {
 
     fn see(&mut self, curve: &Curve) {
         let force = curve.polynomial(self.force);
+        if force.stays_between(self.seen[0].value, self.seen[1].value) {
+            return;
+        }
         let (low, high) = force.range();
         if low < self.seen[0].value {
             let (s, value) = force.negative().greatest(0.0, 1.0);
@@ -220,22 +223,22 @@ impl DriveGauge {
     fn power(&mut self, curve: &Curve, is_brief: bool) {
         let i = curve.polynomial(self.current);
         if is_brief {
-            self.squares[2] += curve.length * integral((0.0, 1.0), |s| i.at(s).powi(2));
+            self.squares[2] += curve.length * square(&i, (0.0, 1.0));
             return;
         }
         let v = self.voltage.on(curve, &i);
         larger(&mut self.seen.voltage.0, &v, (0.0, 1.0), curve);
         larger(&mut self.seen.current.0, &i, (0.0, 1.0), curve);
         let h = curve.length;
-        let (volts, amperes) = (at_places(&v), at_places(&i));
-        self.squares[1] += h * product(&volts, &volts);
-        self.squares[2] += h * product(&amperes, &amperes);
+        let (volts, amperes) = (v.at_nodes(), i.at_nodes());
+        self.squares[1] += h * integral_of_product(&volts, &volts);
+        self.squares[2] += h * integral_of_product(&amperes, &amperes);
         // Energy in and back, split at sign changes of the power.
         let mut count = |energy: f64| {
             if energy > 0.0 { self.seen.energy.0 += energy } else { self.seen.energy.1 -= energy }
         };
         if v.keeps_its_sign() && i.keeps_its_sign() {
-            count(h * product(&volts, &amperes));
+            count(h * integral_of_product(&volts, &amperes));
         } else {
             let mut seams = vec![0.0, 1.0];
             for turning in [v, i].iter().filter(|quantity| !quantity.keeps_its_sign()) {

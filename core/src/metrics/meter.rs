@@ -433,15 +433,17 @@ impl Observe for Meter {
     }
 
     fn see(&mut self, curve: &Curve) {
-        let (lows, highs) = curve.ranges();
-        for (q, peak) in self.sought() {
-            if highs[q] > peak.value.abs() {
-                let (s, value) = curve.polynomial(q).greatest(0.0, 1.0);
-                peak.take(value, curve.begin + s * curve.length);
-            }
-            if -lows[q] > peak.value.abs() {
-                let (s, value) = curve.polynomial(q).negative().greatest(0.0, 1.0);
-                peak.take(-value, curve.begin + s * curve.length);
+        if curve.may_exceed(&self.heights()) {
+            let (lows, highs) = curve.ranges();
+            for (q, peak) in self.sought() {
+                if highs[q] > peak.value.abs() {
+                    let (s, value) = curve.polynomial(q).greatest(0.0, 1.0);
+                    peak.take(value, curve.begin + s * curve.length);
+                }
+                if -lows[q] > peak.value.abs() {
+                    let (s, value) = curve.polynomial(q).negative().greatest(0.0, 1.0);
+                    peak.take(-value, curve.begin + s * curve.length);
+                }
             }
         }
         for (sum, peak) in self.sought.places.sums.iter().zip(&mut self.sums) {
@@ -449,7 +451,7 @@ impl Observe for Meter {
             for &(q, weight) in sum {
                 course.add(&curve.polynomial(q), weight);
             }
-            if course.bound() > peak.value.abs() {
+            if course.may_exceed(peak.value.abs()) {
                 let (s, value) = course.largest(0.0, 1.0);
                 peak.take(value, curve.begin + s * curve.length);
             }

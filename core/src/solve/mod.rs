@@ -13,6 +13,7 @@ mod inputs;
 mod known;
 mod observe;
 mod pace;
+mod polynomial;
 mod propagator;
 mod record;
 mod roots;
@@ -34,9 +35,8 @@ pub use general::{Dynamics, Quantity};
 pub(crate) use inputs::applied;
 pub(crate) use observe::NEWS;
 use observe::Output;
-pub use observe::{
-    Closer, Curve, Extremes, Gap, Gaps, Observe, Polynomial, QUANTITIES, Reading, Stretch, TERMS, reading,
-};
+pub use observe::{Closer, Curve, Extremes, Gap, Gaps, Observe, QUANTITIES, Reading, Stretch, reading};
+pub use polynomial::{Polynomial, TERMS, integral, integral_of_product};
 pub use run::{Course, Run};
 pub use sensitivity::{Begun, Differentiated, Sensitivities, Variable};
 pub use simulator::Simulator;

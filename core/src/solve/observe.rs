@@ -1,5 +1,6 @@
 //! Observation of a run without rows: the motion between events, changes of the input and rows, for an [`Observe`]r.
 
+use super::polynomial::{Polynomial, TERMS, binomials, hermite};
 use super::{Detail, Flow};
 use crate::mechanism::{BODIES, DRIVES, Form, Layout, Mechanism, Mode, Shown, State};
 use crate::solve::widest::widest;
@@ -251,9 +252,6 @@ fn rise(half: f64, bow: f64) -> f64 {
     if half >= 2.0 * bow { half } else { 0.25 * half * half / bow + bow }
 }
 
-/// Number of coefficients of a [`Curve`].
-pub const TERMS: usize = 8;
-
 /// A part of a run on which every quantity is accurately a polynomial of time.
 #[derive(Debug, Clone, Copy)]
 pub struct Curve {
@@ -290,21 +288,32 @@ impl Curve {
     #[inline(always)]
     fn terms_of<const Q: usize>(from: &[Reading; 4], to: &[Reading; 4]) -> [Reading; TERMS] {
         let mut terms = [[0.0; QUANTITIES]; TERMS];
-        terms[..4].copy_from_slice(from);
-        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (from, to);
-        let [.., c4, c5, c6, c7] = &mut terms;
         for q in 0..Q {
-            // Remainder of the first four terms at the other end, by order.
-            let r0 = b0[q] - (a0[q] + a1[q] + a2[q] + a3[q]);
-            let r1 = b1[q] - (a1[q] + 2.0 * a2[q] + 3.0 * a3[q]);
-            let r2 = b2[q] - (a2[q] + 3.0 * a3[q]);
-            let r3 = b3[q] - a3[q];
-            c4[q] = 35.0 * r0 - 15.0 * r1 + 5.0 * r2 - r3;
-            c5[q] = -84.0 * r0 + 39.0 * r1 - 14.0 * r2 + 3.0 * r3;
-            c6[q] = 70.0 * r0 - 34.0 * r1 + 13.0 * r2 - 3.0 * r3;
-            c7[q] = -20.0 * r0 + 10.0 * r1 - 4.0 * r2 + r3;
+            let [before, after] = [from, to].map(|ends| ends.each_ref().map(|end| end[q]));
+            let curve = hermite(before, std::array::from_fn(|k| after[k] - before[k]));
+            terms.iter_mut().zip(curve).for_each(|(term, c)| term[q] = c);
         }
         terms
+    }
+
+    widest! {
+        /// True if the magnitude of any quantity may exceed its height, by Σ |c_k|, which costs less than
+        /// [`Curve::ranges`].
+        pub fn may_exceed(&self, heights: &Reading) -> bool = may_exceed_by_any, may_exceed_by_avx2;
+    }
+
+    #[inline(always)]
+    fn may_exceed_by_any(&self, heights: &Reading) -> bool {
+        if self.few { self.may_exceed_of::<FEW>(heights) } else { self.may_exceed_of::<QUANTITIES>(heights) }
+    }
+
+    #[inline(always)]
+    fn may_exceed_of<const Q: usize>(&self, heights: &Reading) -> bool {
+        let mut sizes = [0.0; Q];
+        for term in &self.terms {
+            sizes.iter_mut().zip(&term[..Q]).for_each(|(size, c)| *size += c.abs());
+        }
+        sizes.iter().zip(&heights[..Q]).fold(false, |any, (size, height)| any | (size > height))
     }
 
     widest! {
@@ -320,7 +329,7 @@ impl Curve {
     #[inline(always)]
     fn ranges_of<const Q: usize>(&self) -> (Reading, Reading) {
         let mut b = self.terms;
-        for (b, binomial) in b.iter_mut().zip(BINOMIAL) {
+        for (b, binomial) in b.iter_mut().zip(const { binomials::<TERMS>() }) {
             b[..Q].iter_mut().for_each(|b| *b /= binomial);
         }
         for i in 1..TERMS {
@@ -351,167 +360,6 @@ impl Curve {
             }
         }
         sum
-    }
-}
-
-/// Σ c_k sᵏ on 0..1.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Polynomial<const T: usize = TERMS>(pub [f64; T]);
-
-impl<const T: usize> Default for Polynomial<T> {
-    fn default() -> Self {
-        Self([0.0; T])
-    }
-}
-
-/// C(7, k)
-const BINOMIAL: [f64; TERMS] = [1.0, 7.0, 21.0, 35.0, 35.0, 21.0, 7.0, 1.0];
-
-/// Number of points at which a polynomial is evaluated first; they resolve its oscillation.
-const LOOKS: usize = 8;
-
-impl Polynomial {
-    /// A bound of its magnitude on 0..1: the largest of its coefficients in Bernstein's form, b_k = Σ_j C(k, j)/C(n, j)
-    /// c_j.
-    #[inline]
-    pub fn bound(&self) -> f64 {
-        let (low, high) = self.range();
-        high.max(-low)
-    }
-
-    /// Bounds of its values on 0..1, likewise.
-    #[inline]
-    pub fn range(&self) -> (f64, f64) {
-        // Each step adds neighbours: Pascal's triangle.
-        let mut b: [f64; TERMS] = std::array::from_fn(|k| self.0[k] / BINOMIAL[k]);
-        for i in 1..TERMS {
-            for k in (i..TERMS).rev() {
-                b[k] += b[k - 1];
-            }
-        }
-        b.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &b| (low.min(b), high.max(b)))
-    }
-}
-
-impl<const T: usize> Polynomial<T> {
-    /// The value at `s`.
-    #[inline(always)]
-    pub fn at(&self, s: f64) -> f64 {
-        self.0.iter().rev().fold(0.0, |sum, c| sum * s + c)
-    }
-
-    fn slope(&self, s: f64) -> f64 {
-        (1..T).rev().fold(0.0, |sum, k| sum * s + k as f64 * self.0[k])
-    }
-
-    fn bend(&self, s: f64) -> f64 {
-        (2..T).rev().fold(0.0, |sum, k| sum * s + (k * (k - 1)) as f64 * self.0[k])
-    }
-
-    /// True if it certainly has no zero.
-    pub fn keeps_its_sign(&self) -> bool {
-        self.0[0].abs() > self.0[1..].iter().map(|c| c.abs()).sum()
-    }
-
-    /// Position between `from` and `to` of the greatest value, and that value.
-    pub fn greatest(&self, from: f64, to: f64) -> (f64, f64) {
-        let place = |k: usize| if k == LOOKS { to } else { from + (to - from) * k as f64 / LOOKS as f64 };
-        let values: [f64; LOOKS + 1] = std::array::from_fn(|k| self.at(place(k)));
-        let mut best = (from, values[0]);
-        for (k, &value) in values.iter().enumerate().filter(|(_, value)| **value > values[0]) {
-            if value > best.1 {
-                best = (place(k), value);
-            }
-        }
-        // A maximum lies between two points with different signs of the slope.
-        let slopes: [f64; LOOKS + 1] = std::array::from_fn(|k| self.slope(place(k)));
-        let mut top = best;
-        for k in (0..LOOKS).filter(|&k| slopes[k] > 0.0 && slopes[k + 1] < 0.0) {
-            let found = self.top([place(k), place(k + 1)]);
-            if found.1 > top.1 {
-                top = found;
-            }
-        }
-        top
-    }
-
-    /// Maximum between two points, with a positive slope at the lower and a negative one at the higher: bracketed
-    /// Newton's method on the slope.
-    fn top(&self, [mut low, mut high]: [f64; 2]) -> (f64, f64) {
-        let mut s = 0.5 * (low + high);
-        for _ in 0..60 {
-            let slope = self.slope(s);
-            if slope > 0.0 {
-                low = s;
-            } else {
-                high = s;
-            }
-            let newton = s - slope / self.bend(s);
-            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            let done = (next - s).abs() <= 1e-13;
-            s = next;
-            if done {
-                break;
-            }
-        }
-        (s, self.at(s))
-    }
-
-    /// Position between `from` and `to` of the largest magnitude, and the value there.
-    pub fn largest(&self, from: f64, to: f64) -> (f64, f64) {
-        let (high, low) = (self.greatest(from, to), self.negative().greatest(from, to));
-        if low.1 > high.1 { (low.0, -low.1) } else { high }
-    }
-
-    /// The least and the greatest value between `from` and `to`.
-    pub fn extremes(&self, from: f64, to: f64) -> (f64, f64) {
-        (-self.negative().greatest(from, to).1, self.greatest(from, to).1)
-    }
-
-    /// Adds another one, times `weight`.
-    pub fn add(&mut self, other: &Self, weight: f64) {
-        self.0.iter_mut().zip(other.0).for_each(|(own, other)| *own += weight * other);
-    }
-
-    /// This reading with the opposite sign.
-    pub fn negative(&self) -> Self {
-        Self(self.0.map(|c| -c))
-    }
-
-    /// Positions between `from` and `to` of its sign changes, in order.
-    pub fn zeros(&self, from: f64, to: f64) -> Vec<f64> {
-        let place = |k: usize| if k == LOOKS { to } else { from + (to - from) * k as f64 / LOOKS as f64 };
-        let mut zeros = Vec::new();
-        let (mut before, mut value) = (from, self.at(from));
-        for k in 1..=LOOKS {
-            let (here, next) = (place(k), self.at(place(k)));
-            if (value < 0.0) != (next < 0.0) {
-                zeros.push(self.zero(before, here, value < 0.0));
-            }
-            (before, value) = (here, next);
-        }
-        zeros
-    }
-
-    /// The zero between `low` and `high`, where the sign differs; `rising` if it is negative at `low`.
-    fn zero(&self, mut low: f64, mut high: f64, rising: bool) -> f64 {
-        let mut s = 0.5 * (low + high);
-        for _ in 0..60 {
-            let value = self.at(s);
-            if (value < 0.0) == rising {
-                low = s
-            } else {
-                high = s
-            }
-            // Newton's step if it stays inside, otherwise bisection.
-            let newton = s - value / self.slope(s);
-            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            if (next - s).abs() <= 1e-15 || high - low <= 1e-15 {
-                return next;
-            }
-            s = next;
-        }
-        s
     }
 }
 
@@ -680,59 +528,5 @@ impl<'a> Output<'a> {
     {
         let observer = self.observer.map(|observer| -> &'b mut dyn Observe { observer });
         Output { detail: self.detail, sink: self.sink, observer }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::chance::uniform;
-    use rand_pcg::Pcg64;
-
-    /// The product of (s − root) over all roots, times a factor.
-    fn with_roots(roots: &[f64], factor: f64) -> Polynomial {
-        let mut c = [0.0; TERMS];
-        c[0] = factor;
-        for root in roots {
-            for k in (0..TERMS).rev() {
-                c[k] = if k > 0 { c[k - 1] } else { 0.0 } - root * c[k];
-            }
-        }
-        Polynomial(c)
-    }
-
-    /// If the best of nine points was on a convex part, Newton's method gave up there, and the peak was too low by a
-    /// relative 9e-8.
-    #[test]
-    fn a_top_beside_an_upward_bend_was_missed() {
-        let mut random = Pcg64::new(5, 1);
-        let mut even = |low: f64, high: f64| low + (high - low) * uniform(&mut random);
-        let mut bent_upwards = 0;
-        for _ in 0..20_000 {
-            let roots: Vec<f64> = (0..6).map(|_| even(-0.5, 1.5)).collect();
-            // The slope has these roots.
-            let slope = with_roots(&roots, even(-1.0, 1.0));
-            let mut c = [0.0; TERMS];
-            (1..TERMS).for_each(|k| c[k] = slope.0[k - 1] / k as f64);
-            let course = Polynomial(c);
-            let (place, value) = course.greatest(0.0, 1.0);
-            assert!((0.0..=1.0).contains(&place) && course.at(place) == value);
-            // A maximum is at a root of the slope, or at an end.
-            let inside = roots.iter().copied().filter(|root| (0.0..=1.0).contains(root));
-            let known = inside.chain([0.0, 1.0]).map(|s| course.at(s)).fold(f64::NEG_INFINITY, f64::max);
-            let size = c.iter().map(|c| c.abs()).sum::<f64>();
-            // Two roots of the slope between adjacent points may hide a maximum of at most this height.
-            let near = (0..roots.len()).any(|i| (0..i).any(|j| (roots[i] - roots[j]).abs() < 1.0 / LOOKS as f64));
-            if !near {
-                assert!(
-                    (known - value).abs() <= 1e-14 * size,
-                    "{roots:?}: {value:e} at {place}, and there is {known:e}"
-                );
-                let best =
-                    (0..=LOOKS).map(|k| k as f64 / LOOKS as f64).max_by(|a, b| course.at(*a).total_cmp(&course.at(*b)));
-                bent_upwards += usize::from(course.bend(best.unwrap()) >= 0.0 && known > course.at(best.unwrap()));
-            }
-        }
-        assert!(bent_upwards > 5, "{bent_upwards}");
     }
 }

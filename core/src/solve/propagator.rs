@@ -163,6 +163,12 @@ impl<const R: usize, const C: usize> Matrix<R, C> {
         sum
     }
 
+    /// The product of a row with it.
+    pub(crate) fn times_from_left(&self, row: &[f64; R]) -> [f64; C] {
+        let product = |column: &[f64; R]| column.iter().zip(row).map(|(entry, weight)| entry * weight).sum();
+        self.column.each_ref().map(product)
+    }
+
     widest! {
         /// z ← z + P z.
         #[inline(always)]

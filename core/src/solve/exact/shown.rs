@@ -316,14 +316,14 @@ impl<const N: usize> ExactRun<'_, N> {
     ) {
         let Part { begin, length, level } = part;
         if level == law.finest || self.watching.curves >= MOST_CURVES {
-            let curve = self.curve(law, from, to, begin, length);
+            let curve = self.curve_of_level(law, from, to, part);
             return self.see(&curve);
         }
         let mut middle = self.after(law, from, level + 1);
         // After recent inaccurate curves, none longer than two of the accurate ones is tried.
         if level + 1 >= self.watching.level {
             self.watching.curves += 1;
-            let curve = self.curve(law, from, to, begin, length);
+            let curve = self.curve_of_level(law, from, to, part);
             let near = |((is, told), scale): ((&f64, f64), &f64)| (is - told).abs() <= OFF * scale;
             if middle.value.iter().zip(curve.at(0.5)).zip(&self.watching.scale).all(near) {
                 // After a number of accurate curves, a longer one is tried.
@@ -427,6 +427,17 @@ impl<const N: usize> ExactRun<'_, N> {
         self.terms(law, from, length, &mut ends[0]);
         self.terms(law, to, length, &mut ends[1]);
         Curve::through(self.is_few(law), [begin, length], &ends[0], &ends[1])
+    }
+
+    /// The curve over a part with matrices; where every part is shown, these give the curve itself, too.
+    fn curve_of_level(&self, law: &ModeMatrices<N>, from: &mut Sight<N>, to: &mut Sight<N>, part: Part) -> Curve {
+        match self.watching.sees_all {
+            true => {
+                let shown = law.shown(&self.core.common.mechanism, &self.core.common.space);
+                law.curve(shown, &from.z, &from.value, part.begin, part.level)
+            }
+            false => self.curve(law, from, to, part.begin, part.length),
+        }
     }
 
     fn see(&mut self, curve: &Curve) {

@@ -6,7 +6,8 @@ use super::rows::{Rows, Shown};
 use super::{Core, StepAdvance};
 use crate::mechanism::{DRIVES, Mode, Shown as Quantity};
 use crate::solve::engine::Engine;
-use crate::solve::observe::{Curve, FEW, Gap, QUANTITIES, Reading, Readout, TERMS};
+use crate::solve::observe::{Curve, FEW, Gap, QUANTITIES, Reading, Readout};
+use crate::solve::polynomial::TERMS;
 
 /// Places within a step at which it is shown, its ends among them: as many as a curve has terms.
 const PLACES: usize = TERMS;

@@ -1,6 +1,6 @@
 //! A quantity within a step, by its ends.
 
-use crate::solve::observe::Polynomial;
+use crate::solve::polynomial::Polynomial;
 use crate::solve::roots::only_extremum;
 
 /// Terms of a series.

@@ -3,9 +3,11 @@
 use super::{ModeMatrices, Space};
 use crate::friction::Motion;
 use crate::mechanism::{BODIES, DRIVES, Mechanism};
-use crate::solve::observe::{FEW, QUANTITIES, Reading, Readout, reading_of};
+use crate::solve::observe::{Curve, FEW, QUANTITIES, Reading, Readout, reading_of};
+use crate::solve::polynomial::{TERMS, hermite};
 use crate::solve::propagator::Matrix;
 use crate::solve::widest::widest;
+use std::sync::OnceLock;
 
 /// Readings behind the first ones.
 const MORE: usize = QUANTITIES - FEW;
@@ -13,12 +15,78 @@ const MORE: usize = QUANTITIES - FEW;
 /// Smallest norm of a rate, negligible beside any other.
 const STILL: f64 = 1e-250;
 
+/// Weight of each element of z in each of the first readings, and in further ones if there are any.
+struct Weights<const N: usize> {
+    first: Matrix<FEW, N>,
+    more: Option<Box<Matrix<MORE, N>>>,
+}
+
+impl<const N: usize> Weights<N> {
+    fn zero(few: bool) -> Self {
+        Self { first: Matrix::zero(), more: (!few).then(|| Box::new(Matrix::zero())) }
+    }
+
+    fn set_row(&mut self, q: usize, weights: &[f64; N]) {
+        for (place, weight) in weights.iter().enumerate() {
+            match (q.checked_sub(FEW), &mut self.more) {
+                (None, _) => self.first.set(q, place, *weight),
+                (Some(q), Some(more)) => more.set(q, place, *weight),
+                (Some(_), None) => {}
+            }
+        }
+    }
+
+    /// The readings of a vector.
+    #[inline(always)]
+    fn times(&self, z: &[f64; N]) -> Reading {
+        joined(&self.first.times(z), self.more.as_ref().map(|more| more.times(z)))
+    }
+}
+
+/// The curve of the readings over an interval as a linear function of z at its beginning: the coefficients of all
+/// powers but that of order zero, which is the reading itself.
+struct CurveWeights<const N: usize>([Weights<N>; TERMS - 1]);
+
+impl<const N: usize> CurveWeights<N> {
+    /// Over h, where z becomes z + P z.
+    fn new(shown: &Shown<N>, rate: &Matrix<N, N>, step: &Matrix<N, N>, h: f64) -> Self {
+        let mut weights = CurveWeights(std::array::from_fn(|_| Weights::zero(shown.readout.few)));
+        let count = if shown.readout.few { FEW } else { QUANTITIES };
+        for q in 0..count {
+            // q⁽ᵏ⁾ hᵏ/k! = c (A h)ᵏ/k! z for the reading c z, and its change over h, c (A h)ᵏ/k! P z
+            let mut orders = [shown.row(q); 4];
+            for k in 1..4 {
+                orders[k] = rate.times_from_left(&orders[k - 1]).map(|weight| weight * (h / k as f64));
+            }
+            let changes = orders.each_ref().map(|order| step.times_from_left(order));
+            let at = |rows: &[[f64; N]; 4], place: usize| rows.map(|row| row[place]);
+            let curves: [_; N] = std::array::from_fn(|place| hermite(at(&orders, place), at(&changes, place)));
+            for (k, weights) in weights.0.iter_mut().enumerate() {
+                weights.set_row(q, &curves.map(|curve| curve[k + 1]));
+            }
+        }
+        weights
+    }
+
+    widest! {
+        /// Writes the coefficients of the curve that begins in `z`, but for that of order zero.
+        fn write(&self, z: &[f64; N], terms: &mut [Reading; TERMS]) = write_by_any, write_by_avx2;
+    }
+
+    #[inline(always)]
+    fn write_by_any(&self, z: &[f64; N], terms: &mut [Reading; TERMS]) {
+        for (term, weights) in terms[1..].iter_mut().zip(&self.0) {
+            *term = weights.times(z);
+        }
+    }
+}
+
 /// Readings of one mode, and the norms of their forms.
 pub(in crate::solve) struct Shown<const N: usize> {
     pub(in crate::solve) readout: Readout,
-    /// Weight of each element of z in each of the first readings, and in further ones.
-    matrix: Matrix<FEW, N>,
-    more: Option<Box<Matrix<MORE, N>>>,
+    weights: Weights<N>,
+    /// The curves over the intervals of each level.
+    curves: Box<[OnceLock<Box<CurveWeights<N>>>]>,
     /// Norm dual to the energy, of elongations held by springs and speeds, and of currents.
     mechanical: Reading,
     magnetic: Reading,
@@ -31,16 +99,9 @@ pub(in crate::solve) struct Shown<const N: usize> {
 impl<const N: usize> Shown<N> {
     fn new(law: &ModeMatrices<N>, mechanism: &Mechanism, space: &Space) -> Self {
         let readout = Readout::new(mechanism, &law.mode);
-        let mut matrix = Matrix::zero();
-        let mut more = (!readout.few).then(|| Box::new(Matrix::zero()));
+        let mut weights = Weights::zero(readout.few);
         for (q, form) in readout.forms.iter().enumerate() {
-            for (place, weight) in space.row::<N>(form).into_iter().enumerate() {
-                match (q.checked_sub(FEW), &mut more) {
-                    (None, _) => matrix.set(q, place, weight),
-                    (Some(q), Some(more)) => more.set(q, place, weight),
-                    (Some(_), None) => {}
-                }
-            }
+            weights.set_row(q, &space.row(form));
         }
         let stuck = law.mode.motion.map(|motion| motion == Motion::Stuck);
         let (mut mechanical, mut magnetic) = ([0.0; QUANTITIES], [0.0; QUANTITIES]);
@@ -74,7 +135,8 @@ impl<const N: usize> Shown<N> {
             }
         }
         let input = std::array::from_fn(|drive| std::array::from_fn(|q: usize| readout.forms[q].input[drive].abs()));
-        Self { readout, matrix, more, mechanical, magnetic, unsprung, input }
+        let curves = law.steps.iter().map(|_| OnceLock::new()).collect();
+        Self { readout, weights, curves, mechanical, magnetic, unsprung, input }
     }
 
     /// The readings at z, with positions relative to `origin`.
@@ -93,15 +155,14 @@ impl<const N: usize> Shown<N> {
     fn read_rows_by_any(&self, rows: &[[f64; N]], origin: &[f64; BODIES], readings: &mut Vec<Reading>) {
         // Not with an iterator's closure, which would not be compiled for the wider vectors.
         for z in rows {
-            let more = self.more.as_ref().map(|more| more.times(z));
-            readings.push(self.readout.placed(joined(&self.matrix.times(z), more), origin));
+            readings.push(self.readout.placed(self.weights.times(z), origin));
         }
     }
 
     /// A quantity as weights of the places of z.
     pub(in crate::solve::exact) fn row(&self, q: usize) -> [f64; N] {
-        std::array::from_fn(|place| match (q.checked_sub(FEW), &self.more) {
-            (None, _) => self.matrix.at(q, place),
+        std::array::from_fn(|place| match (q.checked_sub(FEW), &self.weights.more) {
+            (None, _) => self.weights.first.at(q, place),
             (Some(q), Some(more)) => more.at(q, place),
             (Some(_), None) => 0.0,
         })
@@ -115,7 +176,8 @@ impl<const N: usize> Shown<N> {
     /// Reading of a change of z.
     #[inline]
     pub(in crate::solve) fn change(&self, change: &[f64; N]) -> Reading {
-        joined(&self.matrix.rate(change), self.more.as_ref().map(|more| more.rate(change)))
+        let Weights { first, more } = &self.weights;
+        joined(&first.rate(change), more.as_ref().map(|more| more.rate(change)))
     }
 }
 
@@ -134,6 +196,25 @@ impl<const N: usize> ModeMatrices<N> {
     /// Readings of an observer, prepared at their first use.
     pub(in crate::solve) fn shown(&self, mechanism: &Mechanism, space: &Space) -> &Shown<N> {
         self.shown.get_or_init(|| Box::new(Shown::new(self, mechanism, space)))
+    }
+
+    /// The curve of the readings over an interval of a level, from `z` and the reading there; its matrices are computed
+    /// at their first use.
+    pub(in crate::solve) fn curve(
+        &self,
+        shown: &Shown<N>,
+        z: &[f64; N],
+        reading: &Reading,
+        begin: f64,
+        level: usize,
+    ) -> Curve {
+        let length = self.length(level);
+        let weights = shown.curves[level]
+            .get_or_init(|| Box::new(CurveWeights::new(shown, &self.rate, self.step(level), length)));
+        let mut curve = Curve { begin, length, terms: [[0.0; QUANTITIES]; TERMS], few: shown.readout.few };
+        curve.terms[0] = *reading;
+        weights.write(z, &mut curve.terms);
+        curve
     }
 
     /// Largest deviation of readings from a straight line over any `interval` within the next `length`, with `y` = ż
