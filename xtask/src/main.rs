@@ -166,20 +166,20 @@ fn test(steps: &[Step]) -> Result<(), String> {
         }
     }
     data::before_tests()?;
-    let begin = Instant::now();
+    let whole = Stopwatch::new();
     let (mut counts, ignored) = (Counts::default(), Ignored::new()?);
     for step in steps {
         let command = step.command();
         println!("== {}: cargo {command}", step.what);
-        let begin = Instant::now();
+        let own = Stopwatch::new();
         let succeeded = step.run(&mut counts, &ignored)?;
-        println!("== {}: {:.1} s", step.what, begin.elapsed().as_secs_f64());
+        println!("== {}: {own}", step.what);
         if !succeeded {
             counts.show(&ignored.tests());
             return Err(format!("failed: {}; to repeat it alone: cargo {command}", step.what));
         }
     }
-    println!("\nall steps succeeded in {:.1} s", begin.elapsed().as_secs_f64());
+    println!("\nall steps succeeded in {whole}");
     counts.show(&ignored.tests());
     Ok(())
 }
@@ -208,6 +208,41 @@ impl Step {
             Work::Export => export::prepare(),
         }
     }
+}
+
+/// Time since its making, and the processor time of commands that ended since then.
+struct Stopwatch {
+    begin: Instant,
+    processor: Option<f64>,
+}
+
+impl Stopwatch {
+    fn new() -> Self {
+        Self { begin: Instant::now(), processor: processor_time() }
+    }
+}
+
+impl std::fmt::Display for Stopwatch {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "{:.1} s", self.begin.elapsed().as_secs_f64())?;
+        match processor_time().zip(self.processor) {
+            Some((now, begin)) => write!(f, ", {:.1} s of processor time", now - begin),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Processor time of all commands that have ended, s, where the system keeps it in `/proc`.
+fn processor_time() -> Option<f64> {
+    processor_time_in(&std::fs::read_to_string("/proc/self/stat").ok()?)
+}
+
+/// The same from the text of that file: `cutime` and `cstime`, the 16th and 17th word, in hundredths of a second
+/// (proc_pid_stat(5)). The second word, in brackets, may hold blanks.
+fn processor_time_in(text: &str) -> Option<f64> {
+    let mut words = text.rsplit(')').next()?.split_whitespace().skip(13);
+    let mut hundredths = || words.next()?.parse::<f64>().ok();
+    Some((hundredths()? + hundredths()?) / 100.0)
 }
 
 /// True if a command succeeds; its output is shown as it comes, and the tests in it are counted.
@@ -311,6 +346,13 @@ impl Counts {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_processor_time_of_commands_is_read() {
+        let text = "4242 (a (b) c) S 1 2 3 4 5 6 7 8 9 10 110 12 2050 150 20 0 1";
+        assert_eq!(processor_time_in(text), Some(22.0));
+        assert_eq!(processor_time_in("4242 (a) S 1"), None);
+    }
 
     #[test]
     fn counts_are_summed_over_programs_of_tests() {

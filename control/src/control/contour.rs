@@ -76,12 +76,11 @@ impl Course {
         let (share, left) = self.beside(point);
         let is_beside = (least..=most).contains(&share);
         let far = |share: f64| far(point, self.at(share));
-        let (share, distance) = match is_beside {
-            true => (share, left),
-            false if far(least) < far(most) => (least, far(least).copysign(left)),
-            false => (most, far(most).copysign(left)),
+        let distance = match is_beside {
+            true => left,
+            false => far(least).min(far(most)).copysign(left),
         };
-        Foot { distance, along: self.before + share * self.length, leg: None, is_beside }
+        Foot { distance, leg: None, is_beside }
     }
 }
 
@@ -90,8 +89,6 @@ impl Course {
 pub(super) struct Foot {
     /// Distance of the other point, m, positive to the left.
     pub distance: f64,
-    /// Length of the path up to it, m.
-    along: f64,
     /// Index of its leg, if there is one.
     leg: Option<usize>,
     /// True if it is no end of the part of the leg that may be the nearest.
@@ -132,7 +129,7 @@ impl Contour {
                 best = Some(foot);
             }
         }
-        best.unwrap_or(Foot { distance: far(point, self.start), along: 0.0, leg: None, is_beside: false })
+        best.unwrap_or(Foot { distance: far(point, self.start), leg: None, is_beside: false })
     }
 
     /// Where the profiles are at `time`, s, and the length of the path up to there, m.
@@ -277,7 +274,7 @@ mod tests {
         let path = corner();
         let foot = path.nearest(0.05, [0.03, 0.002], WHOLE);
         assert_eq!((foot.leg, foot.is_beside), (Some(0), true));
-        assert!((foot.distance - 0.002).abs() < 1e-15 && (foot.along - 0.03).abs() < 1e-15);
+        assert!((foot.distance - 0.002).abs() < 1e-15);
         // Beyond the corner, which it cuts to the right of neither leg.
         let foot = path.nearest(10.0, [0.103, -0.004], WHOLE);
         assert!((foot.distance.abs() - 0.005).abs() < 1e-15);
