@@ -181,7 +181,8 @@ fn coverage(machines: u64) -> Coverage {
         let alike = ["belt.stiffness=[1e5, 1e5, 1e5, 1e5]"];
         let own = with_log(case(MachineKind::CoreXy, &alike), &case(MachineKind::CoreXy, &changes), positions, seed);
         let result = fitted(&own, &belts_of_core_xy(&FREE));
-        found.blamed += usize::from(result.findings.iter().any(|one| one.code == "noise"));
+        let is_blamed = result.cause.is_some() || result.findings.iter().any(|one| one.code == "noise");
+        found.blamed += usize::from(is_blamed);
         let is_known = result.is_complete() && result.estimates.iter().all(|one| !one.at_bound);
         let Some(compared) = result.belts().filter(|_| is_known) else {
             found.lost += 1;
@@ -211,13 +212,123 @@ fn intervals_of_gantries_hold_the_truth_about_as_often_as_they_say() {
     println!("{}", found.told());
     let share = found.held[0] as f64 / found.held[1] as f64;
     assert!(found.lost == 0 && found.wrong == 0, "{}", found.told());
+    // The models are right.
+    assert!(20 * found.blamed <= found.machines, "{}", found.told());
     assert!(share >= 0.9 && found.ratios as f64 >= 0.85 * found.machines as f64, "{}", found.told());
     assert!(found.stated as f64 >= 0.8 * found.machines as f64, "{}", found.told());
 }
 
-/// The constants of one motor are off, which belts imitate.
+/// Free parameters of a fit of this kind: masses, friction and belts.
+fn of_kind(kind: MachineKind) -> Plan {
+    let free = ["bridge.mass", "cart.mass", "bridge.friction.viscous", "cart.friction.viscous"];
+    match kind {
+        MachineKind::CoreXy => belts_of_core_xy(&free),
+        MachineKind::HFrame => {
+            let spans = ["belt.stiffness.0", "belt.stiffness.1", "belt.stiffness.2"];
+            Plan { free: free.iter().chain(&spans).map(|key| key.to_string()).collect(), ..Plan::default() }
+        }
+        _ => {
+            let tie = |belt: usize| [2 * belt, 2 * belt + 1].map(|span| format!("belt.stiffness.{span}")).to_vec();
+            Plan { free: free.map(String::from).to_vec(), tied: (0..3).map(tie).collect(), ..Plan::default() }
+        }
+    }
+}
+
+/// Drawn masses and friction of a machine, and the belt of its right drive, relative to those of its file.
+fn drawn(kind: MachineKind, chance: &mut Chance) -> Vec<String> {
+    let plain = case(kind, &[]).machine;
+    let mut changes = vec![
+        format!("bridge.mass={}", chance.between(0.7, 1.1)),
+        format!("cart.mass={}", chance.between(0.3, 0.45)),
+        format!("bridge.friction.viscous={}", chance.between(8.0, 16.0)),
+        format!("cart.friction.viscous={}", chance.between(5.0, 12.0)),
+    ];
+    let factor = chance.between(0.8, 1.2);
+    let right = plain.geometry().spans_of(1);
+    changes.extend(right.map(|span| format!("belt.stiffness.{span}={}", factor * plain.belt.stiffness[span])));
+    changes
+}
+
+fn simulated(kind: MachineKind, changes: &[String]) -> Case {
+    case(kind, &changes.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+/// A wrong torque constant of one drive was never named; masses, friction and belts are drawn, and so are the drive, the
+/// number and its factor.
 #[test]
-fn belts_of_a_doubtful_fit_are_undecided() {
+fn a_wrong_number_of_one_drive_is_named() {
+    let mut chance = Chance::new(4711);
+    for kind in [MachineKind::CoreXy, MachineKind::HFrame, MachineKind::DualBelt] {
+        let drives = kind.geometry().drives;
+        let drive = (chance.uniform() * drives.len() as f64) as usize;
+        let (at, plain) = (drives[drive].key, case(kind, &[]).machine.drives[drive]);
+        let factor = if chance.uniform() < 0.5 { 0.85 } else { 1.15 };
+        let motor = plain.motor;
+        let (names, values): (&[&str], &[f64]) = match (chance.uniform() * 3.0) as usize {
+            0 => (
+                &["motor.torque_constant", "motor.back_emf_constant"],
+                &[motor.torque_constant, motor.back_emf_constant],
+            ),
+            1 => (&["motor.resistance"], &[motor.resistance]),
+            _ => (&["amplifier.gain"], &[plain.amplifier.gain]),
+        };
+        let keys: Vec<String> = names.iter().map(|name| format!("{at}{name}")).collect();
+        let mut changes = drawn(kind, &mut chance);
+        changes.extend(keys.iter().zip(values).map(|(key, value)| format!("{key}={}", factor * value)));
+        let own = with_log(case(kind, &[]), &simulated(kind, &changes), None, 3);
+        let found = fitted(&own, &of_kind(kind));
+        let what = format!("{kind:?} {} {factor}", keys.join(" = "));
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{what}: {:#?}", found.findings));
+        let size = &cause.parameters[0];
+        assert!(cause.key == "drive" && size.name == keys.join(" = "), "{what}: {}", cause.words);
+        assert!((size.value / values[0] / factor - 1.0).abs() < 0.01, "{what}: {}", cause.words);
+        assert!(found.warnings().any(|one| one.code == "drive"), "{what}");
+        if let Some(belts) = found.belts() {
+            let [low, high] = belts.interval();
+            assert!(high / low < 1.1, "{what}: {}", belts.words());
+        }
+    }
+}
+
+/// Inputs that act a drawn number of samples late.
+#[test]
+fn a_delay_of_the_inputs_of_a_gantry_is_named() {
+    let mut chance = Chance::new(99);
+    for kind in [MachineKind::CoreXy, MachineKind::HFrame, MachineKind::DualBelt] {
+        let late = 1 + usize::from(chance.uniform() < 0.5);
+        let mut own = with_log(case(kind, &[]), &simulated(kind, &drawn(kind, &mut chance)), None, 3);
+        let log = Arc::make_mut(own.experiments[0].log.as_mut().unwrap());
+        for output in &mut log.outputs {
+            output.values.rotate_right(late);
+            output.values[..late].fill(0.0);
+        }
+        let found = fitted(&own, &of_kind(kind));
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{kind:?} {late}: {:#?}", found.findings));
+        assert!(cause.key == "delay" && cause.parameters[0].name == "delay", "{kind:?} {late}: {}", cause.words);
+        assert!((cause.parameters[0].value - 1e-3 * late as f64).abs() < 1e-5, "{kind:?} {late}: {}", cause.words);
+    }
+}
+
+/// Racking of a bridge in a log whose model has none.
+#[test]
+fn a_bridge_that_yaws_is_named() {
+    let yaw = "bridge.yaw={ inertia = 0.02, belt_spacing = 0.5, bearing_spacing = 0.06, bearing_stiffness = 5e6, \
+               bearing_damping = 300 }";
+    let mut chance = Chance::new(7);
+    for kind in [MachineKind::CoreXy, MachineKind::HFrame] {
+        let mut changes = drawn(kind, &mut chance);
+        changes.push(yaw.into());
+        let own = with_log(case(kind, &[]), &simulated(kind, &changes), None, 3);
+        let found = fitted(&own, &of_kind(kind));
+        let told: Vec<String> = found.findings.iter().map(ToString::to_string).collect();
+        let is_named = found.cause.as_ref().is_some_and(|cause| cause.key == "yaw");
+        assert!(is_named || found.warnings().any(|one| one.code == "noise"), "{kind:?}: {told:#?}");
+    }
+}
+
+/// The constants of one motor are off, which belts imitate, and were taken for a looser belt.
+#[test]
+fn belts_are_compared_with_the_element_that_explains_the_residuals() {
     let alike = ["belt.stiffness=[1e5, 1e5, 1e5, 1e5]"];
     let plain = case(MachineKind::CoreXy, &alike);
     let [torque, back] =
@@ -230,8 +341,9 @@ fn belts_of_a_doubtful_fit_are_undecided() {
     let own = with_log(plain, &case(MachineKind::CoreXy, &changes), None, 3);
     let found = fitted(&own, &belts_of_core_xy(&FREE));
     assert!(found.warnings().next().is_some());
-    let belts = found.belts().unwrap();
-    assert_eq!(belts.looser(), None, "{}", belts.words());
+    // Named, so that belts are told by the fit with them.
+    let [low, high] = found.belts().unwrap().interval();
+    assert!(low < 1.0 && 1.0 < high && high / low < 1.2, "{low} to {high}: {:#?}", found.findings);
     // The same with these constants.
     let knowing = fitted(
         &with_log(case(MachineKind::CoreXy, &changes), &case(MachineKind::CoreXy, &changes), None, 3),

@@ -223,6 +223,22 @@ impl<'a> Problem<'a> {
             }
             for (index, seen) in run.seen.iter().enumerate() {
                 let counted = readings.iter().flatten().any(|reading| reading.takes(index));
+                if !bias
+                    && !counted
+                    && seen.quantity.is_position()
+                    && seen.step > 0.0
+                    && readings.iter().any(Option::is_some)
+                {
+                    // Where the start is that of another sensor, a count begins anywhere within a step of it.
+                    run.extras.push(Extra {
+                        what: Nuisance::Bias(index),
+                        start: 0.0,
+                        unit: seen.step,
+                        low: -seen.step,
+                        high: seen.step,
+                        known: Some(seen.step / 12f64.sqrt()),
+                    });
+                }
                 if bias && !counted {
                     let wide = extent(&seen.values).max(1e-9);
                     run.extras.push(Extra {

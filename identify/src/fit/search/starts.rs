@@ -69,7 +69,8 @@ pub(crate) struct Effort {
     pub options: Options,
     /// True if friction curves are simulated as piecewise linear.
     pub is_straight: bool,
-    /// True if a search by differences whose iterations are used up does not begin again with new weights.
+    /// True if it begins near its end: machines without a balance of torques need no search for a start, and a search by
+    /// differences whose iterations are used up does not begin again with new weights.
     pub is_short: bool,
 }
 
@@ -109,7 +110,11 @@ pub(crate) fn search_as_far<'a>(
         work.evaluations += minimum.evaluations;
         minimum
     };
-    let start = first_guess(case, plan, &mut problem, &mut descend)?;
+    let start = match effort.is_short && !problem.machine.has_torque_balance() {
+        // It begins at the result for all logs.
+        true => problem.start(),
+        false => first_guess(case, plan, &mut problem, &mut descend)?,
+    };
     let mut best = descend(&mut problem, &start, &whole);
     if best.ending == Ending::Failed {
         return Err(Error::new("the model cannot be run through these logs with the values of the case file")
@@ -396,6 +401,16 @@ fn in_windows(
         }
     }
     Ok(best.map(|best| best.x))
+}
+
+/// Such a start for a problem of several coordinates as it is, from the point `start`; `None` if no step succeeds.
+pub(crate) fn start_in_windows(case: &Case, plan: &Plan, problem: &mut Problem, start: &[f64]) -> Option<Vec<f64>> {
+    let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
+        let options = Options { rounding: problem.rounding(), ..*options };
+        let bounds = problem.bounds();
+        minimise(problem, x, &bounds, &options, &mut |_, _| Flow::Continue)
+    };
+    in_windows(case, plan, problem, start, &mut descend).ok().flatten()
 }
 
 /// True if residuals are within the noise of the logs, estimated by third differences, which motion only increases.
