@@ -378,13 +378,10 @@ fn in_windows(
     if plan.windows.is_some() || plan.closed_loop || globals == 0 {
         return Ok(None);
     }
-    let total: f64 = problem.runs.iter().map(FittedLog::length).sum();
-    let rows: usize = problem.runs.iter().map(|run| run.time.len()).sum();
     let (mut guess, mut best) = (start.to_vec(), None);
     for length in std::iter::once(None).chain(START_WINDOWS.map(Some)) {
         if let Some(length) = length {
-            let length = (length * total / rows as f64).max(total / MOST_START_WINDOWS);
-            let windowed = Plan { windows: Some(length), ..plan.clone() };
+            let windowed = windowed(plan, problem, length);
             if !improve(case, &windowed, problem, &mut guess, descend)? {
                 break;
             }
@@ -403,14 +400,28 @@ fn in_windows(
     Ok(best.map(|best| best.x))
 }
 
-/// Such a start for a problem of several coordinates as it is, from the point `start`; `None` if no step succeeds.
+/// A start for an element that a machine of several coordinates may lack, from the point `start`: by fits in the shorter
+/// of these windows alone, which are ranked afterwards. `None` if they fail.
 pub(crate) fn start_in_windows(case: &Case, plan: &Plan, problem: &mut Problem, start: &[f64]) -> Option<Vec<f64>> {
     let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
         let options = Options { rounding: problem.rounding(), ..*options };
         let bounds = problem.bounds();
         minimise(problem, x, &bounds, &options, &mut |_, _| Flow::Continue)
     };
-    in_windows(case, plan, problem, start, &mut descend).ok().flatten()
+    let mut guess = start.to_vec();
+    for length in &START_WINDOWS[..START_WINDOWS.len() - 1] {
+        let windowed = windowed(plan, problem, *length);
+        improve(case, &windowed, problem, &mut guess, &mut descend).ok().filter(|is_good| *is_good)?;
+    }
+    Some(guess)
+}
+
+/// The plan in windows of so many samples, but no more windows than [`MOST_START_WINDOWS`].
+fn windowed(plan: &Plan, problem: &Problem, samples: f64) -> Plan {
+    let total: f64 = problem.runs.iter().map(FittedLog::length).sum();
+    let rows: usize = problem.runs.iter().map(|run| run.time.len()).sum();
+    let length = (samples * total / rows as f64).max(total / MOST_START_WINDOWS);
+    Plan { windows: Some(length), ..plan.clone() }
 }
 
 /// True if residuals are within the noise of the logs, estimated by third differences, which motion only increases.

@@ -126,9 +126,8 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
 fn of_noise(found: &Searched, fit: &Fit, is_named: bool) -> Option<Finding> {
     let problem = &found.problem;
     let is_searched = problem.machine.has_torque_balance();
-    // An element that is a warning itself.
-    let is_warned = fit.cause.as_ref().is_some_and(|cause| cause.explained >= CAUSE_WARNS);
-    if problem.parameters.is_empty() || is_searched && is_named || is_warned {
+    let is_explained = fit.cause.as_ref().is_some_and(|cause| cause.explained >= CAUSE_SETTLES);
+    if problem.parameters.is_empty() || is_searched && is_named || is_explained {
         return None;
     }
     let most = if is_searched { FAR_BEYOND_NOISE } else { MORE_THAN_NOISE };

@@ -37,7 +37,7 @@ use crate::fit::limits::{
     CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSES_FITTED, COLOURED, HELD_OUT_SHOWS, NORMAL,
     SAME_MINIMUM, STARTS_FITTED,
 };
-use crate::fit::search::starts::{Effort, Searched};
+use crate::fit::search::starts::{Effort, Searched, is_noise};
 use crate::machine::Machine;
 use extension::{Extended, Extension, Fitted, On, Said, Site};
 use nalgebra::{DMatrix, DVector};
@@ -49,6 +49,7 @@ const EXTENSIONS: &[Extension] = &[
     row("play", On::Axis, gear::plays, gear::play_words, gear::without),
     row("sensor_play", On::Axis, sensor::plays, sensor::words, as_it_is),
     row("drive", On::Gantry, drive::numbers, drive::words, as_it_is),
+    row("sensor_scale", On::Gantry, sensor::scales, sensor::scale_words, as_it_is),
     row("delay", On::Any, stamp::delays, stamp::words, as_it_is),
     row("limit", On::Axis, amplifier::limits, amplifier::limit_words, amplifier::without_limit),
     row("inductance", On::Any, amplifier::inductances, amplifier::inductance_words, amplifier::without_inductance),
@@ -162,10 +163,13 @@ fn begun<'a>(site: &Site<'_, 'a>, is_curved: bool, goal: f64) -> Vec<Tried<'a>> 
     starts.into_iter().map(|(_, tried)| tried).collect()
 }
 
-/// True if missing elements are searched for: the residuals are not white, and the fit supports it.
+/// True if missing elements are searched for: the residuals are not white, or, of a machine of several coordinates, above
+/// the noise, and the fit supports it.
 pub(crate) fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool {
     let problem = &found.problem;
-    judged.inflation >= COLOURED
+    // Noise of a narrow band, such as the swing of a belt, may determine parameters as well as white noise does.
+    let is_astray = || !case.machine.has_one_coordinate() && !is_noise(problem, &found.best);
+    (judged.inflation >= COLOURED || is_astray())
         && case.machine.stepper().is_none()
         && plan.windows.is_none()
         && plan.until.is_none()
