@@ -9,7 +9,7 @@ use crate::chance;
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
-use crate::fit::asked::run::FittedLog;
+use crate::fit::asked::run::{FittedLog, MeasuredOutput};
 use crate::fit::limits::{
     FILE_ROUNDING, FIRST_BEGINNING, HUBER, LEAST_ROWS, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE,
     SAME_MINIMUM, SHORTEST_BEGINNING, START_WINDOWS, STEPS, STEPS_IN_PART, SWINGS_KEEP, TRIAL_ITERATIONS,
@@ -426,17 +426,23 @@ fn windowed(plan: &Plan, problem: &Problem, samples: f64) -> Plan {
 
 /// True if residuals are within the noise of the logs, estimated by third differences, which motion only increases.
 pub(crate) fn is_noise(problem: &Problem, at: &Minimum) -> bool {
+    times_noise(problem, at) <= MORE_THAN_NOISE
+}
+
+/// The residuals of the worst output of any log, as a multiple of that noise.
+pub(crate) fn times_noise(problem: &Problem, at: &Minimum) -> f64 {
     let noise = problem.noise();
-    let is_own = |(index, run): (usize, &FittedLog)| {
+    let of_run = |(index, run): (usize, &FittedLog)| {
         let (first, n) = (problem.first_row(index), run.time.len());
-        run.seen.iter().enumerate().all(|(output, seen)| {
+        let of_output = |(output, seen): (usize, &MeasuredOutput)| {
             let of = |k: usize| at.residuals[first + output * n + k] / seen.weights[k];
             let own: Vec<f64> = (0..n).filter(|&k| seen.weights[k] > 0.0).map(of).collect();
             let mean = own.iter().map(|r| r * r).sum::<f64>() / own.len().max(1) as f64;
-            mean.sqrt() <= MORE_THAN_NOISE * noise.deviation(seen.quantity)
-        })
+            mean.sqrt() / noise.deviation(seen.quantity)
+        };
+        run.seen.iter().enumerate().map(of_output).fold(0.0, f64::max)
     };
-    problem.runs.iter().enumerate().all(is_own)
+    problem.runs.iter().enumerate().map(of_run).fold(0.0, f64::max)
 }
 
 /// A random point within the bounds and near the start: within a factor of ten, or between zero and three times its

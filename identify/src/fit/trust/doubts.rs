@@ -56,6 +56,8 @@ pub struct Cause {
     pub estimates: Vec<Option<Size>>,
     /// The comparison of the belts by the fit with it.
     pub belts: Option<Belts>,
+    /// The residuals of the worst output with it, as a multiple of the noise of the logs.
+    pub(crate) times_noise: f64,
     /// The change of the case file that adds it.
     pub add: String,
     /// Number of held-out parts of the logs that it predicts better, and of all parts.

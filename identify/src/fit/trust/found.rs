@@ -145,7 +145,9 @@ impl Fit {
     pub fn belts(&self) -> Option<Belts> {
         let stated = self.identifiability.as_ref()?.belts.as_ref()?.belts.clone();
         if let Some(cause) = self.cause.as_ref().filter(|cause| cause.explained >= CAUSE_SETTLES) {
-            return cause.belts.clone().or(Some(stated));
+            let with = cause.belts.clone().unwrap_or(stated);
+            let is_far = cause.times_noise > BELTS_DOUBTFUL;
+            return Some(if is_far { Belts { error: f64::INFINITY, ..with } } else { with });
         }
         let element = self.cause.as_ref().map(|cause| cause.key);
         let is_far = self.times_noise > BELTS_DOUBTFUL;

@@ -113,8 +113,10 @@ pub(crate) fn cause(case: &Case, plan: &Plan, found: &Searched, law: Option<&Oth
         let standard_errors = known.map_or(0.0, |known| tried.standard_errors(known));
         let better = if standard_errors < CAUSE_ERRORS { None } else { folds.predicts(&tried) };
         if let (Some(known), Some(better)) = (known, better) {
-            let others: Vec<String> =
-                open.iter().filter(|other| tried.is_like(known, other)).map(|o| o.words(&site)).collect();
+            let rivals = std::mem::take(&mut open).into_iter().filter(|other| tried.may_be_like(known, other));
+            let whole = rivals.filter_map(|other| if other.is_whole() { Some(other) } else { other.advanced(&site) });
+            let others = whole.filter(|other| tried.may_be_like(known, other)).map(|other| other.words(&site));
+            let others: Vec<String> = others.collect();
             return tried.told(&site, known, ([explained, standard_errors], better), &others);
         }
         // Other starts that led to this minimum are refused with it.

@@ -12,7 +12,7 @@ use crate::fit::limits::{
 };
 use crate::fit::search::least_squares::{minimise, resume};
 use crate::fit::search::point::{Ending, Minimum, Options};
-use crate::fit::search::starts::{is_noise, start_in_windows};
+use crate::fit::search::starts::{is_noise, start_in_windows, times_noise};
 use crate::fit::trust::doubts::{Cause, Size};
 use crate::fit::trust::uncertainty::Judged;
 use crate::machine::Machine;
@@ -38,7 +38,7 @@ impl<'a> Tried<'a> {
     /// that they will not fall below `goal`.
     pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, goal: f64) -> Option<Self> {
         let mut begun = Self::from(site, row, extended, (&site.found.problem, &site.found.best.x))?;
-        if site.is_anew && !row.is_curved {
+        if site.is_anew {
             let Self { extended: Extended { case, plan, .. }, problem, best, .. } = &mut begun;
             let start = start_in_windows(case, plan, problem, &best.x)?;
             let bounds = problem.bounds();
@@ -141,10 +141,11 @@ impl<'a> Tried<'a> {
         self.best.cost
     }
 
-    /// The row of the table, the side on which the sensor is, and the parameter that differs.
+    /// The row of the table, the side on which the sensor is, and the number, one of several, that differs.
     pub fn kind(&self) -> (&'static str, bool, &str) {
         let name = match &self.extended.telling {
             Telling::Differs(name) => name,
+            Telling::Nuisance(Nuisance::SensorScale(quantity), _) => quantity.name(),
             _ => "",
         };
         (self.row.key, self.extended.at_motor, name)
@@ -155,12 +156,12 @@ impl<'a> Tried<'a> {
         is_noise(&self.problem, &self.best)
     }
 
-    /// True if the logs hardly tell another parameter that differs from this one: with n values, of which slow noise
-    /// leaves n/i², the logarithm of the likelihood is less by n/i² ln(C′/C)/2.
-    pub fn is_like(&self, judged: &Judged, other: &Self) -> bool {
+    /// True if the logs may hardly tell another number of the same row from this one, by the least that its fit may end
+    /// with: with n values, of which slow noise leaves n/i², the logarithm of the likelihood is less by n/i² ln(C′/C)/2.
+    pub fn may_be_like(&self, judged: &Judged, other: &Self) -> bool {
         let is_other = self.row.key == other.row.key && self.kind() != other.kind();
         let n = self.problem.counted() as f64 / (judged.inflation * judged.inflation).max(1.0);
-        is_other && n * (other.cost() / self.cost()).ln() < CAUSE_ALIKE * CAUSE_ALIKE
+        is_other && n * (other.least().max(0.0) / self.cost()).ln() < CAUSE_ALIKE * CAUSE_ALIKE
     }
 
     /// Information of the logs on it.
@@ -316,7 +317,20 @@ impl<'a> Tried<'a> {
         }
         let belts = judged.identifiability.belts.as_ref().map(|compared| compared.belts.clone());
         let key = self.row.key;
-        Some(Cause { key, words, explained, standard_errors, parameters, estimates, belts, add, better, added })
+        let times_noise = times_noise(&self.problem, &self.best);
+        Some(Cause {
+            key,
+            words,
+            explained,
+            standard_errors,
+            parameters,
+            estimates,
+            belts,
+            times_noise,
+            add,
+            better,
+            added,
+        })
     }
 
     /// The standard error of a function of the variables: √(gᵀ C g), g its gradient.

@@ -1,7 +1,9 @@
 //! Yaw of the bridge of a gantry on its bearings (racking).
 //!
 //! Motors and belts see the yaw stiffness k_ψ and the moment of inertia by the arm a of the belts only, as k_ψ/a² and
-//! I/a². The bridge begins as a uniform beam between the belts, I = m (2a)²/12.
+//! I/a². The bridge begins as a uniform beam between the belts, I = m (2a)²/12. Where the spans of a belt are alike, as
+//! those of a CoreXY about the middle of its travel, their pulls do not turn the bridge, and encoders at the motors do not
+//! show its yaw.
 
 use super::extension::{Extended, Fitted, Said, Site, Telling, shown};
 use crate::fit::limits::{CAUSE_AROUND, YAW_BEARINGS, YAW_SPACING, YAW_STIFFNESS};
@@ -11,7 +13,7 @@ const KEY: &str = "bridge.yaw.bearing_stiffness";
 
 /// Bearings of several stiffnesses, relative to that of the belts.
 pub(super) fn bearings(site: &Site) -> Vec<Extended> {
-    let machine = &site.machine;
+    let machine = site.begins();
     let Some(bridge) = machine.bridge.as_ref().filter(|_| machine.yaw.is_none()) else { return Vec::new() };
     let belts = machine.belt.stiffness[..machine.geometry().spans.len()].iter().copied().fold(0.0, f64::max);
     let arm = 0.5 * YAW_SPACING;
