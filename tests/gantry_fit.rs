@@ -251,7 +251,7 @@ fn drawn(kind: MachineKind, chance: &mut Chance) -> Vec<String> {
 }
 
 /// The length of logs of fits with missing elements, which take long.
-const SHORT: &str = "experiment.0.until=0.2";
+const SHORT: &str = "experiment.0.until=0.3";
 
 fn simulated(kind: MachineKind, changes: &[String]) -> Case {
     case(kind, &changes.iter().map(String::as_str).collect::<Vec<_>>())

@@ -68,7 +68,7 @@ pub(super) fn words(site: &Site, extended: &Extended, found: &Fitted) -> Said {
     let of_case = "that of the case";
     let words = match () {
         () if name.contains(BACK) => {
-            format!("constants K_t and K_e of the motor of the {label} that are {times} times those of the case")
+            format!("a motor of the {label} whose constants K_t and K_e are {times} times those of the case")
         }
         () if name.contains(RESISTANCE) => format!(
             "a resistance of the motor of the {label} that is {times} times {of_case} (or K_t alone that is {} times \

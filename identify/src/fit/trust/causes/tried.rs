@@ -156,10 +156,11 @@ impl<'a> Tried<'a> {
         is_noise(&self.problem, &self.best)
     }
 
-    /// True if the logs may hardly tell another number of the same row from this one, by the least that its fit may end
+    /// True if the logs may hardly tell another number of a drive or sensor from this one, by the least that its fit may end
     /// with: with n values, of which slow noise leaves n/i², the logarithm of the likelihood is less by n/i² ln(C′/C)/2.
     pub fn may_be_like(&self, judged: &Judged, other: &Self) -> bool {
-        let is_other = self.row.key == other.row.key && self.kind() != other.kind();
+        let is_number = |one: &Self| !one.kind().2.is_empty();
+        let is_other = is_number(self) && is_number(other) && self.kind() != other.kind();
         let n = self.problem.counted() as f64 / (judged.inflation * judged.inflation).max(1.0);
         is_other && n * (other.least().max(0.0) / self.cost()).ln() < CAUSE_ALIKE * CAUSE_ALIKE
     }
