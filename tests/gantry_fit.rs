@@ -7,7 +7,7 @@ use taut::case::{Case, Plan};
 use taut::fit::compare::{ComparisonOptions, FrictionLaw, compare};
 use taut::fit::{Fit, check, drift, fit};
 use taut::log::{Log, Output, Quantity};
-use taut::machine::MachineKind;
+use taut::machine::{Machine, MachineKind};
 use taut::signal::Hold;
 use taut::solve::{Flow, Solver, simulate};
 use taut::trajectory::Trajectory;
@@ -73,7 +73,8 @@ fn logged(run: &Trajectory, kind: MachineKind, positions: Option<f64>, seed: u64
 
 /// The case with the log of `truth`, to be fitted from its own values.
 fn with_log(mut case: Case, truth: &Case, positions: Option<f64>, seed: u64) -> Case {
-    let run = simulate(&truth.machine, &truth.experiments[0], Solver::Exact).unwrap().trajectory;
+    let solver = if truth.machine.yaw.is_some() { Solver::General { tolerance: 1e-10 } } else { Solver::Exact };
+    let run = simulate(&truth.machine, &truth.experiments[0], solver).unwrap().trajectory;
     let log = logged(&run, truth.machine.kind, positions, seed);
     case.experiments[0].inputs = log.signals();
     case.experiments[0].log = Some(Arc::new(log));
@@ -181,7 +182,8 @@ fn coverage(machines: u64) -> Coverage {
         let alike = ["belt.stiffness=[1e5, 1e5, 1e5, 1e5]"];
         let own = with_log(case(MachineKind::CoreXy, &alike), &case(MachineKind::CoreXy, &changes), positions, seed);
         let result = fitted(&own, &belts_of_core_xy(&FREE));
-        found.blamed += usize::from(result.findings.iter().any(|one| one.code == "noise"));
+        let is_blamed = result.cause.is_some() || result.findings.iter().any(|one| one.code == "noise");
+        found.blamed += usize::from(is_blamed);
         let is_known = result.is_complete() && result.estimates.iter().all(|one| !one.at_bound);
         let Some(compared) = result.belts().filter(|_| is_known) else {
             found.lost += 1;
@@ -211,13 +213,160 @@ fn intervals_of_gantries_hold_the_truth_about_as_often_as_they_say() {
     println!("{}", found.told());
     let share = found.held[0] as f64 / found.held[1] as f64;
     assert!(found.lost == 0 && found.wrong == 0, "{}", found.told());
+    // The models are right.
+    assert!(20 * found.blamed <= found.machines, "{}", found.told());
     assert!(share >= 0.9 && found.ratios as f64 >= 0.85 * found.machines as f64, "{}", found.told());
     assert!(found.stated as f64 >= 0.8 * found.machines as f64, "{}", found.told());
 }
 
-/// The constants of one motor are off, which belts imitate.
+/// Free parameters of a fit of this kind: masses, friction and belts.
+fn of_kind(kind: MachineKind) -> Plan {
+    let free = ["bridge.mass", "cart.mass", "bridge.friction.viscous", "cart.friction.viscous"];
+    match kind {
+        MachineKind::CoreXy => belts_of_core_xy(&free),
+        MachineKind::HFrame => {
+            let spans = ["belt.stiffness.0", "belt.stiffness.1", "belt.stiffness.2"];
+            Plan { free: free.iter().chain(&spans).map(|key| key.to_string()).collect(), ..Plan::default() }
+        }
+        _ => {
+            let tie = |belt: usize| [2 * belt, 2 * belt + 1].map(|span| format!("belt.stiffness.{span}")).to_vec();
+            Plan { free: free.map(String::from).to_vec(), tied: (0..3).map(tie).collect(), ..Plan::default() }
+        }
+    }
+}
+
+/// Drawn masses and friction of a machine, and the belt of its right drive, relative to those of its file.
+fn drawn(kind: MachineKind, chance: &mut Chance) -> Vec<String> {
+    let plain = case(kind, &[]).machine;
+    let mut changes = vec![
+        format!("bridge.mass={}", chance.between(0.7, 1.1)),
+        format!("cart.mass={}", chance.between(0.3, 0.45)),
+        format!("bridge.friction.viscous={}", chance.between(8.0, 16.0)),
+        format!("cart.friction.viscous={}", chance.between(5.0, 12.0)),
+    ];
+    let factor = chance.between(0.8, 1.2);
+    let right = plain.geometry().spans_of(1);
+    changes.extend(right.map(|span| format!("belt.stiffness.{span}={}", factor * plain.belt.stiffness[span])));
+    changes
+}
+
+/// The length of logs of fits with missing elements, which take long.
+const SHORT: &str = "experiment.0.until=0.3";
+
+fn simulated(kind: MachineKind, changes: &[String]) -> Case {
+    case(kind, &changes.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+/// A wrong torque constant of one drive was never named; masses, friction and belts are drawn, and so are the drive, the
+/// number and its factor.
 #[test]
-fn belts_of_a_doubtful_fit_are_undecided() {
+fn a_wrong_number_of_one_drive_is_named() {
+    let mut chance = Chance::new(4711);
+    for kind in [MachineKind::CoreXy, MachineKind::HFrame, MachineKind::DualBelt] {
+        let drives = kind.geometry().drives;
+        let drive = (chance.uniform() * drives.len() as f64) as usize;
+        let (at, plain) = (drives[drive].key, case(kind, &[]).machine.drives[drive]);
+        let factor = if chance.uniform() < 0.5 { 0.85 } else { 1.15 };
+        let motor = plain.motor;
+        let (names, values): (&[&str], &[f64]) = match (chance.uniform() * 3.0) as usize {
+            0 => (
+                &["motor.torque_constant", "motor.back_emf_constant"],
+                &[motor.torque_constant, motor.back_emf_constant],
+            ),
+            1 => (&["motor.resistance"], &[motor.resistance]),
+            _ => (&["amplifier.gain"], &[plain.amplifier.gain]),
+        };
+        let keys: Vec<String> = names.iter().map(|name| format!("{at}{name}")).collect();
+        let mut changes = drawn(kind, &mut chance);
+        changes.push(SHORT.into());
+        changes.extend(keys.iter().zip(values).map(|(key, value)| format!("{key}={}", factor * value)));
+        let own = with_log(case(kind, &[SHORT]), &simulated(kind, &changes), None, 3);
+        let found = fitted(&own, &of_kind(kind));
+        let what = format!("{kind:?} {} {factor}", keys.join(" = "));
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{what}: {:#?}", found.findings));
+        let size = &cause.parameters[0];
+        assert!(cause.key == "drive" && size.name == keys.join(" = "), "{what}: {}", cause.words);
+        assert!((size.value / values[0] / factor - 1.0).abs() < 0.01, "{what}: {}", cause.words);
+        assert!(found.findings.iter().any(|one| one.code == "drive"), "{what}");
+        // The belts by the fit with that number.
+        let ratio = |machine: &Machine| {
+            let of_drive =
+                |drive| kind.geometry().spans_of(drive).map(|span| machine.belt.stiffness[span]).sum::<f64>();
+            of_drive(1) / of_drive(0)
+        };
+        if let Some(belts) = found.belts().filter(|_| cause.explained > 0.9) {
+            let [low, high] = belts.interval();
+            let truth = ratio(&simulated(kind, &changes).machine);
+            assert!(high / low < 1.1 && 0.99 * low < truth && truth < 1.01 * high, "{what}: {}", belts.words());
+        }
+    }
+}
+
+/// An encoder that counts 1 to 3 % too few or too many, or a pulley of another radius below it.
+#[test]
+fn a_factor_on_the_readings_of_one_encoder_is_named() {
+    let mut chance = Chance::new(5);
+    for kind in [MachineKind::CoreXy, MachineKind::HFrame] {
+        let mut changes = drawn(kind, &mut chance);
+        changes.push(SHORT.into());
+        let mut own = with_log(case(kind, &[SHORT]), &simulated(kind, &changes), None, 3);
+        let size = chance.between(0.01, 0.03);
+        let factor = if chance.uniform() < 0.5 { 1.0 - size } else { 1.0 + size };
+        let log = Arc::make_mut(own.experiments[0].log.as_mut().unwrap());
+        let output = &mut log.outputs[usize::from(chance.uniform() < 0.5)];
+        output.values.iter_mut().for_each(|value| *value = COUNT * (factor * *value / COUNT).round());
+        let what = format!("{kind:?} {} {factor}", output.quantity.name());
+        let name = output.quantity.name();
+        let found = fitted(&own, &of_kind(kind));
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{what}: {:#?}", found.findings));
+        // The logs may hardly tell a factor on one encoder from its inverse on the other.
+        assert!(cause.key == "sensor_scale" && cause.words.contains(name), "{what}: {}", cause.words);
+        let size = 1.0 + cause.parameters[0].value;
+        assert!([factor, 1.0 / factor].iter().any(|own| (size - own).abs() < 2e-3), "{what}: {}", cause.words);
+    }
+}
+
+/// Inputs that act a drawn number of samples late.
+#[test]
+fn a_delay_of_the_inputs_of_a_gantry_is_named() {
+    let mut chance = Chance::new(99);
+    for kind in [MachineKind::CoreXy, MachineKind::HFrame, MachineKind::DualBelt] {
+        let late = 1 + usize::from(chance.uniform() < 0.5);
+        let mut changes = drawn(kind, &mut chance);
+        changes.push(SHORT.into());
+        let mut own = with_log(case(kind, &[SHORT]), &simulated(kind, &changes), None, 3);
+        let log = Arc::make_mut(own.experiments[0].log.as_mut().unwrap());
+        for output in &mut log.outputs {
+            output.values.rotate_right(late);
+            output.values[..late].fill(0.0);
+        }
+        let found = fitted(&own, &of_kind(kind));
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{kind:?} {late}: {:#?}", found.findings));
+        assert!(cause.key == "delay" && cause.parameters[0].name == "delay", "{kind:?} {late}: {}", cause.words);
+        assert!((cause.parameters[0].value - 1e-3 * late as f64).abs() < 1e-5, "{kind:?} {late}: {}", cause.words);
+    }
+}
+
+/// Racking of a bridge in a log whose model has none.
+#[test]
+fn a_bridge_that_yaws_is_named() {
+    let yaw = "bridge.yaw={ inertia = 0.02, belt_spacing = 0.5, bearing_spacing = 0.06, bearing_stiffness = 5e6, \
+               bearing_damping = 300 }";
+    let mut chance = Chance::new(7);
+    for kind in [MachineKind::CoreXy, MachineKind::HFrame] {
+        let mut changes = drawn(kind, &mut chance);
+        changes.extend([SHORT, yaw].map(String::from));
+        let own = with_log(case(kind, &[SHORT]), &simulated(kind, &changes), None, 3);
+        let found = fitted(&own, &of_kind(kind));
+        let told: Vec<String> = found.findings.iter().map(ToString::to_string).collect();
+        let is_named = found.cause.as_ref().is_some_and(|cause| cause.key == "yaw");
+        assert!(is_named || found.warnings().any(|one| one.code == "noise"), "{kind:?}: {told:#?}");
+    }
+}
+
+/// The constants of one motor are off, which belts imitate, and were taken for a looser belt.
+#[test]
+fn belts_are_compared_with_the_element_that_explains_the_residuals() {
     let alike = ["belt.stiffness=[1e5, 1e5, 1e5, 1e5]"];
     let plain = case(MachineKind::CoreXy, &alike);
     let [torque, back] =
@@ -230,8 +379,9 @@ fn belts_of_a_doubtful_fit_are_undecided() {
     let own = with_log(plain, &case(MachineKind::CoreXy, &changes), None, 3);
     let found = fitted(&own, &belts_of_core_xy(&FREE));
     assert!(found.warnings().next().is_some());
-    let belts = found.belts().unwrap();
-    assert_eq!(belts.looser(), None, "{}", belts.words());
+    // Named, so that belts are told by the fit with them.
+    let [low, high] = found.belts().unwrap().interval();
+    assert!(low < 1.0 && 1.0 < high && high / low < 1.2, "{low} to {high}: {:#?}", found.findings);
     // The same with these constants.
     let knowing = fitted(
         &with_log(case(MachineKind::CoreXy, &changes), &case(MachineKind::CoreXy, &changes), None, 3),
@@ -315,13 +465,13 @@ fn belts_are_found_from_a_stiffness_that_is_far_off() {
     }
 }
 
-/// A bridge that rubs more on its way back, fitted with friction that is the same both ways: no element is tried on
-/// gantries, but it is said that one lacks.
+/// A bridge that rubs more on its way back, fitted with friction that is the same both ways: it is said that the model
+/// lacks what is not among the elements that are tried.
 #[test]
 fn what_a_gantry_lacks_is_a_warning() {
     for kind in [MachineKind::CoreXy, MachineKind::HFrame, MachineKind::DualBelt] {
-        let truth = case(kind, &["bridge.friction.static=3", "bridge.friction.coulomb_backward=3"]);
-        let own = with_log(case(kind, &[]), &truth, None, 5);
+        let truth = case(kind, &[SHORT, "bridge.friction.static=3", "bridge.friction.coulomb_backward=3"]);
+        let own = with_log(case(kind, &[SHORT]), &truth, None, 5);
         let plan = Plan { free: vec!["bridge.friction.coulomb".into(), "bridge.mass".into()], ..Plan::default() };
         let found = fitted(&own, &plan);
         let warned: Vec<&str> = found.warnings().map(|one| one.code).collect();

@@ -159,6 +159,9 @@ pub struct Nuisances {
     pub bias: bool,
     /// The position whose sensor has play: its reading follows the motion only when the play is used up.
     pub sensor_play: Option<Quantity>,
+    /// The quantity whose readings have a factor: no key of the case, whose logs have `scale`, but an element that a fit
+    /// tries.
+    pub sensor_scale: Option<Quantity>,
 }
 
 /// For which logs a number holds.
@@ -558,6 +561,7 @@ fn nuisances(table: &Table, machine: &Machine, experiments: &[Experiment], whole
         initial_state: flag("initial_state")?,
         bias: flag("bias")?,
         sensor_play: table.optional("sensor_play").map_or(Ok(None), |field| logged_position(&field, machine, logs))?,
+        sensor_scale: None,
     })
 }
 

@@ -1234,6 +1234,31 @@ pub(crate) const CAUSE_SLOW: f64 = 0.01;
 /// Unit: steps. Source: chosen.
 pub(crate) const CAUSE_SLOW_STEPS: usize = 4;
 
+/// Factors on a number of a drive between which it is searched.
+///
+/// Unit: 1. Source: chosen. Test: `a_wrong_number_of_one_drive_is_named`.
+pub(crate) const DRIVE_FACTORS: [f64; 2] = [0.2, 5.0];
+
+/// Difference of the likelihoods of two parameters up to which the logs do not tell which of them differs.
+///
+/// Unit: standard errors. Source: chosen.
+pub(crate) const CAUSE_ALIKE: f64 = 3.0;
+
+/// Yaw stiffnesses that are tried, at the belts.
+///
+/// Unit: the stiffness of the stiffest span. Source: chosen. Test: `a_bridge_that_yaws_is_named`.
+pub(crate) const YAW_STIFFNESS: [f64; 2] = [1.0, 8.0];
+
+/// Distance of the belts of a bridge whose yaw is tried. Its yaw stiffness at the belts does not depend on it.
+///
+/// Unit: m. Source: that of the example in the table of parameters.
+pub(crate) const YAW_SPACING: f64 = 0.5;
+
+/// Distance of the bearings of such a bridge.
+///
+/// Unit: m. Source: as above.
+pub(crate) const YAW_BEARINGS: f64 = 0.06;
+
 /// Bounds of the size of an element, relative to its start.
 ///
 /// Unit: 1. Source: chosen: starts are 2 to 4 times apart.

@@ -178,7 +178,8 @@ impl<'a> Problem<'a> {
     }
 
     fn add_extras(&mut self, case: &Case, plan: &Plan) {
-        let &Nuisances { delay, input_gain, input_offset, initial_state, bias, sensor_play } = &plan.nuisance;
+        let &Nuisances { delay, input_gain, input_offset, initial_state, bias, sensor_play, sensor_scale } =
+            &plan.nuisance;
         let interval = self.runs[0].interval();
         // Samples that are taken after their stamps appear as an early input, if the input is logged.
         let mut inputs = self.runs.iter().flat_map(FittedLog::inputs);
@@ -200,6 +201,10 @@ impl<'a> Problem<'a> {
             let wide = seen.map(|seen| extent(&seen.values)).fold(1e-9, f64::max);
             let (what, unit) = (Nuisance::SensorPlay(quantity), 1e-2 * wide);
             scopes.push((Scope::Shared, Extra { what, start: 0.0, unit, low: 0.0, high: wide, known: None }));
+        }
+        if let Some(quantity) = sensor_scale {
+            let what = Nuisance::SensorScale(quantity);
+            scopes.push((Scope::Shared, Extra { what, start: 0.0, unit: 0.01, low: -0.9, high: 9.0, known: None }));
         }
         self.shared = scopes.iter().filter(|(scope, _)| *scope == Scope::Shared).map(|(_, extra)| *extra).collect();
         let noise = self.noise();
@@ -223,6 +228,22 @@ impl<'a> Problem<'a> {
             }
             for (index, seen) in run.seen.iter().enumerate() {
                 let counted = readings.iter().flatten().any(|reading| reading.takes(index));
+                if !bias
+                    && !counted
+                    && seen.quantity.is_position()
+                    && seen.step > 0.0
+                    && readings.iter().any(Option::is_some)
+                {
+                    // Where the start is that of another sensor, a count begins anywhere within a step of it.
+                    run.extras.push(Extra {
+                        what: Nuisance::Bias(index),
+                        start: 0.0,
+                        unit: seen.step,
+                        low: -seen.step,
+                        high: seen.step,
+                        known: Some(seen.step / 12f64.sqrt()),
+                    });
+                }
                 if bias && !counted {
                     let wide = extent(&seen.values).max(1e-9);
                     run.extras.push(Extra {

@@ -32,6 +32,8 @@ pub enum Nuisance {
     Bias(usize),
     /// Width of the play between the machine and the sensor of this quantity, in its unit.
     SensorPlay(Quantity),
+    /// Factor on the readings of this quantity, less 1.
+    SensorScale(Quantity),
     /// Share of that play that lies ahead at the start.
     SensorStart(Quantity),
 }
@@ -53,6 +55,7 @@ impl Nuisance {
             Nuisance::StartSpeed(slide) => of_slide(slide, "start_speed"),
             Nuisance::Bias(_) => "bias".into(),
             Nuisance::SensorPlay(_) => "sensor_play".into(),
+            Nuisance::SensorScale(_) => "sensor_scale".into(),
             Nuisance::SensorStart(_) => "sensor_start".into(),
         }
     }
@@ -65,7 +68,7 @@ impl Nuisance {
             Nuisance::StartPosition(_) => "m",
             Nuisance::StartSpeed(_) => "m/s",
             Nuisance::SensorPlay(quantity) => quantity.unit(),
-            Nuisance::InputGain(_) | Nuisance::Bias(_) | Nuisance::SensorStart(_) => "",
+            Nuisance::InputGain(_) | Nuisance::Bias(_) | Nuisance::SensorScale(_) | Nuisance::SensorStart(_) => "",
         }
     }
 
@@ -74,9 +77,9 @@ impl Nuisance {
         matches!(self, Nuisance::StartPosition(_) | Nuisance::StartSpeed(_) | Nuisance::SensorStart(_))
     }
 
-    /// True if it is of the play of a sensor, which changes readings and not the motion.
+    /// True if it is of the play or the scale of a sensor, which changes readings and not the motion.
     pub(crate) fn is_of_sensor(self) -> bool {
-        matches!(self, Nuisance::SensorPlay(_) | Nuisance::SensorStart(_))
+        matches!(self, Nuisance::SensorPlay(_) | Nuisance::SensorScale(_) | Nuisance::SensorStart(_))
     }
 }
 
@@ -330,12 +333,15 @@ impl FittedLog {
         let is_placed = machine.changes_along_travel() || machine.slides().any(|slide| slide.travel.is_some());
         match extra.what {
             Nuisance::Bias(_) => true,
-            Nuisance::StartPosition(_) => self.seen.iter().all(|seen| !seen.absolute) && !is_placed,
+            Nuisance::StartPosition(_) => {
+                self.seen.iter().all(|seen| !seen.absolute) && !is_placed && !self.has_scaled_sensor()
+            }
             Nuisance::Delay
             | Nuisance::InputGain(_)
             | Nuisance::InputOffset(_)
             | Nuisance::StartSpeed(_)
             | Nuisance::SensorPlay(_)
+            | Nuisance::SensorScale(_)
             | Nuisance::SensorStart(_) => false,
         }
     }
@@ -518,6 +524,16 @@ impl FittedLog {
             }
         }
         true
+    }
+
+    /// True if the readings of a sensor have a factor.
+    pub(crate) fn has_scaled_sensor(&self) -> bool {
+        self.extras.iter().chain(&self.shared).any(|extra| matches!(extra.what, Nuisance::SensorScale(_)))
+    }
+
+    /// The factor on the readings of output `index`.
+    pub(crate) fn sensor_scale(&self, index: usize, extras: &[f64]) -> f64 {
+        1.0 + self.extra(Nuisance::SensorScale(self.seen[index].quantity), extras).unwrap_or(0.0)
     }
 
     /// The bias of output `index`.

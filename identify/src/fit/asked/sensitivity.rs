@@ -35,7 +35,7 @@ impl Problem<'_> {
         };
         // If the start of the cart does not matter, it is the origin, so that all runs share the prepared matrices; but
         // angles then depend on the radius.
-        let mut is_moved = self.runs[index].is_shifted(machine);
+        let mut is_moved = self.runs[index].is_shifted(machine) && !self.runs[index].has_scaled_sensor();
         let Some(mut all) = variables(is_moved) else { return false };
         if is_moved && all.iter().any(|variable| changes_radius(machine, variable)) {
             is_moved = false;
@@ -70,7 +70,19 @@ impl Problem<'_> {
         let columns: Vec<usize> = movers.into_iter().chain(of_sensor).collect();
         for (i, (values, slopes)) in slopes.iter_mut().enumerate() {
             slopes.resize(columns.len(), vec![0.0; rows]);
-            let Some(play) = run.sensor_play(i, &own) else { continue };
+            let Some(play) = run.sensor_play(i, &own) else {
+                // d(s y) = s dy + y ds
+                let scale = run.sensor_scale(i, &own);
+                for (slopes, j) in slopes.iter_mut().zip(&columns) {
+                    match self.extra_of((index, *j)) {
+                        Some(Extra { what: Nuisance::SensorScale(of), unit, .. }) if of == run.seen[i].quantity => {
+                            slopes.iter_mut().zip(values.iter()).for_each(|(slope, value)| *slope = unit * value);
+                        }
+                        _ => slopes.iter_mut().for_each(|slope| *slope *= scale),
+                    }
+                }
+                continue;
+            };
             let by = |j: &usize| match self.extra_of((index, *j)) {
                 Some(Extra { what: Nuisance::SensorPlay(of), unit, .. }) if of == run.seen[i].quantity => [unit, 0.0],
                 Some(Extra { what: Nuisance::SensorStart(of), unit, .. }) if of == run.seen[i].quantity => [0.0, unit],
@@ -136,7 +148,10 @@ impl Problem<'_> {
                 let from = run.begins(drive, &self.extras_of(index, x))?;
                 Some(Variable::Offset { drive, unit, from })
             }
-            Some((Nuisance::Bias(_) | Nuisance::SensorPlay(_) | Nuisance::SensorStart(_), _)) => None,
+            Some((
+                Nuisance::Bias(_) | Nuisance::SensorPlay(_) | Nuisance::SensorScale(_) | Nuisance::SensorStart(_),
+                _,
+            )) => None,
             Some((Nuisance::StartPosition(_) | Nuisance::StartSpeed(_), _)) => {
                 Some(Variable::central(START_STEP, |by| begun(x[j] + by)))
             }

@@ -88,16 +88,16 @@ impl FittedLog {
         Some(SensorPlay { width, ahead: self.extra(Nuisance::SensorStart(quantity), extras).unwrap_or(0.5) })
     }
 
-    /// Readings of the sensor of output `index` for these values of the model: with its play, its sign lost, and its
-    /// bias.
+    /// Readings of the sensor of output `index` for these values of the model: with its play and its factor, its sign
+    /// lost, and its bias.
     pub(crate) fn read(&self, index: usize, values: &[f64], extras: &[f64]) -> Vec<f64> {
         let mut read = match self.sensor_play(index, extras) {
             Some(play) => play.read(values),
             None => values.to_vec(),
         };
-        let bias = self.bias(index, extras);
+        let (scale, bias) = (self.sensor_scale(index, extras), self.bias(index, extras));
         let is_absolute = self.seen[index].absolute;
-        read.iter_mut().for_each(|value| *value = if is_absolute { value.abs() } else { *value } + bias);
+        read.iter_mut().for_each(|value| *value = scale * if is_absolute { value.abs() } else { *value } + bias);
         read
     }
 }

@@ -9,7 +9,7 @@ use crate::chance;
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
-use crate::fit::asked::run::FittedLog;
+use crate::fit::asked::run::{FittedLog, MeasuredOutput};
 use crate::fit::limits::{
     FILE_ROUNDING, FIRST_BEGINNING, HUBER, LEAST_ROWS, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE,
     SAME_MINIMUM, SHORTEST_BEGINNING, START_WINDOWS, STEPS, STEPS_IN_PART, SWINGS_KEEP, TRIAL_ITERATIONS,
@@ -69,7 +69,8 @@ pub(crate) struct Effort {
     pub options: Options,
     /// True if friction curves are simulated as piecewise linear.
     pub is_straight: bool,
-    /// True if a search by differences whose iterations are used up does not begin again with new weights.
+    /// True if it begins near its end: machines without a balance of torques need no search for a start, and a search by
+    /// differences whose iterations are used up does not begin again with new weights.
     pub is_short: bool,
 }
 
@@ -109,7 +110,11 @@ pub(crate) fn search_as_far<'a>(
         work.evaluations += minimum.evaluations;
         minimum
     };
-    let start = first_guess(case, plan, &mut problem, &mut descend)?;
+    let start = match effort.is_short && !problem.machine.has_torque_balance() {
+        // It begins at the result for all logs.
+        true => problem.start(),
+        false => first_guess(case, plan, &mut problem, &mut descend)?,
+    };
     let mut best = descend(&mut problem, &start, &whole);
     if best.ending == Ending::Failed {
         return Err(Error::new("the model cannot be run through these logs with the values of the case file")
@@ -373,13 +378,10 @@ fn in_windows(
     if plan.windows.is_some() || plan.closed_loop || globals == 0 {
         return Ok(None);
     }
-    let total: f64 = problem.runs.iter().map(FittedLog::length).sum();
-    let rows: usize = problem.runs.iter().map(|run| run.time.len()).sum();
     let (mut guess, mut best) = (start.to_vec(), None);
     for length in std::iter::once(None).chain(START_WINDOWS.map(Some)) {
         if let Some(length) = length {
-            let length = (length * total / rows as f64).max(total / MOST_START_WINDOWS);
-            let windowed = Plan { windows: Some(length), ..plan.clone() };
+            let windowed = windowed(plan, problem, length);
             if !improve(case, &windowed, problem, &mut guess, descend)? {
                 break;
             }
@@ -398,19 +400,49 @@ fn in_windows(
     Ok(best.map(|best| best.x))
 }
 
+/// A start for an element that a machine of several coordinates may lack, from the point `start`: by fits in the shorter
+/// of these windows alone, which are ranked afterwards. `None` if they fail.
+pub(crate) fn start_in_windows(case: &Case, plan: &Plan, problem: &mut Problem, start: &[f64]) -> Option<Vec<f64>> {
+    let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
+        let options = Options { rounding: problem.rounding(), ..*options };
+        let bounds = problem.bounds();
+        minimise(problem, x, &bounds, &options, &mut |_, _| Flow::Continue)
+    };
+    let mut guess = start.to_vec();
+    for length in &START_WINDOWS[..START_WINDOWS.len() - 1] {
+        let windowed = windowed(plan, problem, *length);
+        improve(case, &windowed, problem, &mut guess, &mut descend).ok().filter(|is_good| *is_good)?;
+    }
+    Some(guess)
+}
+
+/// The plan in windows of so many samples, but no more windows than [`MOST_START_WINDOWS`].
+fn windowed(plan: &Plan, problem: &Problem, samples: f64) -> Plan {
+    let total: f64 = problem.runs.iter().map(FittedLog::length).sum();
+    let rows: usize = problem.runs.iter().map(|run| run.time.len()).sum();
+    let length = (samples * total / rows as f64).max(total / MOST_START_WINDOWS);
+    Plan { windows: Some(length), ..plan.clone() }
+}
+
 /// True if residuals are within the noise of the logs, estimated by third differences, which motion only increases.
 pub(crate) fn is_noise(problem: &Problem, at: &Minimum) -> bool {
+    times_noise(problem, at) <= MORE_THAN_NOISE
+}
+
+/// The residuals of the worst output of any log, as a multiple of that noise.
+pub(crate) fn times_noise(problem: &Problem, at: &Minimum) -> f64 {
     let noise = problem.noise();
-    let is_own = |(index, run): (usize, &FittedLog)| {
+    let of_run = |(index, run): (usize, &FittedLog)| {
         let (first, n) = (problem.first_row(index), run.time.len());
-        run.seen.iter().enumerate().all(|(output, seen)| {
+        let of_output = |(output, seen): (usize, &MeasuredOutput)| {
             let of = |k: usize| at.residuals[first + output * n + k] / seen.weights[k];
             let own: Vec<f64> = (0..n).filter(|&k| seen.weights[k] > 0.0).map(of).collect();
             let mean = own.iter().map(|r| r * r).sum::<f64>() / own.len().max(1) as f64;
-            mean.sqrt() <= MORE_THAN_NOISE * noise.deviation(seen.quantity)
-        })
+            mean.sqrt() / noise.deviation(seen.quantity)
+        };
+        run.seen.iter().enumerate().map(of_output).fold(0.0, f64::max)
     };
-    problem.runs.iter().enumerate().all(is_own)
+    problem.runs.iter().enumerate().map(of_run).fold(0.0, f64::max)
 }
 
 /// A random point within the bounds and near the start: within a factor of ten, or between zero and three times its

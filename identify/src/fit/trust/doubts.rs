@@ -1,6 +1,7 @@
 //! Reasons to widen intervals beyond noise: parts of the logs that disagree, another friction law, and a missing
 //! element.
 
+use crate::control::belts::Belts;
 use nalgebra::DMatrix;
 
 /// Parts of the logs that disagree with the whole.
@@ -40,8 +41,8 @@ pub struct OtherLaw {
 /// An element that the model lacks and the logs show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
-    /// Its key: `spring`, `play`, `sensor_play`, `delay`, `limit`, `inductance`, `drag`, `stribeck`, `lugre`, `load`,
-    /// `apart`.
+    /// Its key: `spring`, `play`, `sensor_play`, `sensor_scale`, `drive`, `delay`, `limit`, `inductance`, `drag`, `stribeck`, `lugre`,
+    /// `load`, `apart`, `yaw`.
     pub key: &'static str,
     /// In words, with its size.
     pub words: String,
@@ -53,6 +54,10 @@ pub struct Cause {
     pub parameters: Vec<Size>,
     /// The estimates of the fit with it, in their order; `None` if the fit with it has no such value.
     pub estimates: Vec<Option<Size>>,
+    /// The comparison of the belts by the fit with it.
+    pub belts: Option<Belts>,
+    /// The residuals of the worst output with it, as a multiple of the noise of the logs.
+    pub(crate) times_noise: f64,
     /// The change of the case file that adds it.
     pub add: String,
     /// Number of held-out parts of the logs that it predicts better, and of all parts.

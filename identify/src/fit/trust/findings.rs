@@ -126,15 +126,21 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
 fn of_noise(found: &Searched, fit: &Fit, is_named: bool) -> Option<Finding> {
     let problem = &found.problem;
     let is_searched = problem.machine.has_torque_balance();
-    if problem.parameters.is_empty() || is_searched && is_named {
+    let is_explained = fit.cause.as_ref().is_some_and(|cause| cause.explained >= CAUSE_SETTLES);
+    if problem.parameters.is_empty() || is_searched && is_named || is_explained {
         return None;
     }
     let most = if is_searched { FAR_BEYOND_NOISE } else { MORE_THAN_NOISE };
     let beyond: Vec<(Quantity, f64)> = found.times_noise().filter(|(_, times)| *times > most).collect();
-    let named = |(quantity, times): &(Quantity, f64)| format!("{} {} times", quantity.name(), significant(*times, 2));
-    let oscillating = |(quantity, _): &(Quantity, f64)| fit.oscillations.iter().find(|(own, _)| own == quantity);
-    let frequencies: Option<Vec<String>> =
-        beyond.iter().map(|own| oscillating(own).map(|(_, hertz)| engineering_typed(*hertz, "Hz", 2))).collect();
+    let oscillating = |(quantity, _): &(Quantity, f64)| {
+        let own = fit.oscillations.iter().find(|(own, _)| own == quantity);
+        own.map(|(_, hertz)| engineering_typed(*hertz, "Hz", 2))
+    };
+    let named = |own: &(Quantity, f64)| {
+        let at = oscillating(own).filter(|_| !is_searched).map(|hertz| format!(" at {hertz}")).unwrap_or_default();
+        format!("{} {} times{at}", own.0.name(), significant(own.1, 2))
+    };
+    let frequencies: Option<Vec<String>> = beyond.iter().map(oscillating).collect();
     let next = if let (true, Some(frequencies)) = (is_searched && problem.swings, frequencies) {
         &format!(
             "they oscillate at {}, by a vibration that the model lacks or by noise, for which the intervals allow",
@@ -143,6 +149,10 @@ fn of_noise(found: &Searched, fit: &Fit, is_named: bool) -> Option<Finding> {
     } else if is_searched {
         "the model lacks something that none of the tried elements explains, and the intervals hold only as far as what \
          is missing resembles noise"
+    } else if problem.machine.stepper().is_none() {
+        "the model lacks something that none of the tried elements explains, or the search ended in one of several \
+         minima; try starts = 8 in [fit], begin with values nearer to the machine's, or let `taut fit --drift` try \
+         single changes of a machine that was known"
     } else {
         "the model lacks something, or the search ended in one of several minima; try starts = 8 in [fit], or begin \
          with values nearer to the machine's"
@@ -151,8 +161,7 @@ fn of_noise(found: &Searched, fit: &Fit, is_named: bool) -> Option<Finding> {
     let text = format!("residuals exceed the noise of the logs ({names}): {next}");
     // The share of the squared residuals that noise does not explain: 1 − σ²/σ_e².
     let unexplained = beyond.iter().map(|(_, times)| 1.0 - times.powi(-2)).fold(0.0, f64::max);
-    let is_warned = unexplained >= CAUSE_WARNS && !is_searched;
-    let grade = if is_warned { Grade::Warning } else { Grade::Note };
+    let grade = if unexplained >= CAUSE_WARNS && !is_searched { Grade::Warning } else { Grade::Note };
     (!beyond.is_empty()).then(|| finding(grade, "noise", text))
 }
 

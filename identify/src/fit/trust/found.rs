@@ -6,7 +6,7 @@ use super::finding::{Finding, Grade};
 use super::identify::Identifiability;
 use super::scores::LogFit;
 use crate::control::belts::Belts;
-use crate::fit::limits::BELTS_DOUBTFUL;
+use crate::fit::limits::{BELTS_DOUBTFUL, CAUSE_SETTLES};
 use crate::fit::noise::Wave;
 use crate::fit::search::point::{Ending, Strategy};
 use crate::fit::search::starts::Work;
@@ -139,10 +139,16 @@ impl Fit {
     }
 
     /// The comparison of the belts of two drives; `None` for a machine with one drive, or if no free parameter changes
-    /// them. Undetermined if the fit is doubtful for another reason than residuals a little above the noise, or a
-    /// missing element, for which intervals are widened.
+    /// them. Where a missing element explains nearly all of the residuals, it is that of the fit with it, since the fit
+    /// without it may have ended anywhere. Undetermined if the fit is doubtful for another reason than residuals a little
+    /// above the noise, or a missing element, for which intervals are widened.
     pub fn belts(&self) -> Option<Belts> {
         let stated = self.identifiability.as_ref()?.belts.as_ref()?.belts.clone();
+        if let Some(cause) = self.cause.as_ref().filter(|cause| cause.explained >= CAUSE_SETTLES) {
+            let with = cause.belts.clone().unwrap_or(stated);
+            let is_far = cause.times_noise > BELTS_DOUBTFUL;
+            return Some(if is_far { Belts { error: f64::INFINITY, ..with } } else { with });
+        }
         let element = self.cause.as_ref().map(|cause| cause.key);
         let is_far = self.times_noise > BELTS_DOUBTFUL;
         let mut warnings = self.warnings().filter(|finding| Some(finding.code) != element);

@@ -60,22 +60,21 @@ pub(super) fn without_limit(site: &Site, mut machine: Machine) -> Machine {
     machine
 }
 
-/// An inductance, with which the current follows the voltage late.
+/// An inductance of all motors, with which the current follows the voltage late.
 pub(super) fn inductances(site: &Site) -> Vec<Extended> {
     const KEY: &str = "motor.inductance";
-    let DriveUnit { amplifier, motor, .. } = &site.machine.drives[0];
-    if site.is_free(KEY)
-        || motor.inductance > 0.0
-        || amplifier.mode != AmplifierMode::Voltage
-        || motor.resistance <= 0.0
-    {
+    let lacks = |DriveUnit { amplifier, motor, .. }: &DriveUnit| {
+        motor.inductance == 0.0 && amplifier.mode == AmplifierMode::Voltage && motor.resistance > 0.0
+    };
+    let machine = site.begins();
+    if site.is_free(KEY) || !machine.drives.iter().all(lacks) {
         return Vec::new();
     }
     // L = R τ
-    let inductances = CAUSE_LAGS.map(|lag| motor.resistance * lag);
+    let inductances = CAUSE_LAGS.map(|lag| machine.drives[0].motor.resistance * lag);
     let with = |inductance: &f64| {
-        let mut machine = site.machine.clone();
-        machine.drives[0].motor.inductance = *inductance;
+        let mut machine = machine.clone();
+        machine.drives.iter_mut().for_each(|drive| drive.motor.inductance = *inductance);
         machine
     };
     let bounds = [CAUSE_AROUND[0] * inductances[0], CAUSE_AROUND[1] * inductances[CAUSE_LAGS.len() - 1]];
@@ -90,6 +89,6 @@ pub(super) fn inductance_words(site: &Site, _: &Extended, found: &Fitted) -> Sai
 
 /// The machine without inductance.
 pub(super) fn without_inductance(_: &Site, mut machine: Machine) -> Machine {
-    machine.drives[0].motor.inductance = 0.0;
+    machine.drives.iter_mut().for_each(|drive| drive.motor.inductance = 0.0);
     machine
 }

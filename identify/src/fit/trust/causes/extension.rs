@@ -3,7 +3,7 @@
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::Nuisance;
-use crate::fit::search::starts::Searched;
+use crate::fit::search::starts::{Searched, is_noise};
 use crate::fit::trust::doubts::Size;
 use crate::friction::Friction;
 use crate::log::Quantity;
@@ -19,12 +19,34 @@ pub(super) struct Site<'s, 'a> {
     pub found: &'s Searched<'a>,
     /// The machine with the estimates.
     pub machine: Machine,
+    /// True if the fit of a machine of several coordinates ended elsewhere than within the noise, so that elements begin
+    /// with the values of the case.
+    pub is_anew: bool,
     fastest: OnceCell<f64>,
+}
+
+/// The machines on which an element is tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum On {
+    Any,
+    Axis,
+    Gantry,
+}
+
+impl On {
+    pub fn takes(self, machine: &Machine) -> bool {
+        match self {
+            On::Any => true,
+            On::Axis => machine.has_one_coordinate(),
+            On::Gantry => !machine.has_one_coordinate(),
+        }
+    }
 }
 
 /// One element.
 pub(super) struct Extension {
     pub key: &'static str,
+    pub on: On,
     /// True if its runs have no exact derivatives.
     pub is_curved: bool,
     /// The case and the plan with it, once for each start; empty if the case has it already.
@@ -58,6 +80,8 @@ pub(super) enum Telling {
     Nuisance(Nuisance, f64),
     /// The parameters of these names, which are equal without the element.
     Apart(Vec<String>),
+    /// The parameter of this name, which is that of the case without the element.
+    Differs(String),
 }
 
 /// A quantity that is a multiple of a parameter.
@@ -103,7 +127,14 @@ impl Extended {
 
 impl<'s, 'a> Site<'s, 'a> {
     pub fn new(case: &'s Case, plan: &'s Plan, found: &'s Searched<'a>) -> Self {
-        Self { case, plan, found, machine: found.problem.stage_at(&found.best.x), fastest: OnceCell::new() }
+        let machine = found.problem.stage_at(&found.best.x);
+        let is_anew = !machine.has_one_coordinate() && !is_noise(&found.problem, &found.best);
+        Self { case, plan, found, machine, is_anew, fastest: OnceCell::new() }
+    }
+
+    /// The machine with which elements begin.
+    pub fn begins(&self) -> &Machine {
+        if self.is_anew { &self.case.machine } else { &self.machine }
     }
 
     /// The case with another machine.

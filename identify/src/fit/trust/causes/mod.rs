@@ -11,16 +11,22 @@
 //! of the residuals. An element is accepted if its size differs significantly from zero, and if the fit with it to
 //! parts of the logs predicts the other parts better. With the distance d of the estimates from those with it,
 //! intervals of half-width h become √(h² + 2 (d² + h′²)) ≥ d + h′, h′ that of the fit with the element.
+//!
+//! A machine of several coordinates swings out of step with a log that a wrong model cannot follow, and its fit ends
+//! anywhere. Where it does not end within the noise, elements begin with the values of the case and a search in windows,
+//! as the fit itself did, row by row, until one leaves noise.
 
 mod amplifier;
 mod apart;
 mod bristles;
+mod drive;
 mod extension;
 mod force;
 mod gear;
 mod sensor;
 mod stamp;
 mod tried;
+mod yaw;
 
 use super::doubts::{Cause, OtherLaw};
 use super::parts::{Fold, Parts, errors};
@@ -31,34 +37,38 @@ use crate::fit::limits::{
     CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSES_FITTED, COLOURED, HELD_OUT_SHOWS, NORMAL,
     SAME_MINIMUM, STARTS_FITTED,
 };
-use crate::fit::search::starts::{Effort, Searched};
+use crate::fit::search::starts::{Effort, Searched, is_noise};
 use crate::machine::Machine;
-use extension::{Extended, Extension, Fitted, Said, Site};
+use extension::{Extended, Extension, Fitted, On, Said, Site};
 use nalgebra::{DMatrix, DVector};
 use tried::Tried;
 
 /// All elements.
 const EXTENSIONS: &[Extension] = &[
-    row("spring", gear::springs, gear::spring_words, gear::without),
-    row("play", gear::plays, gear::play_words, gear::without),
-    row("sensor_play", sensor::plays, sensor::words, as_it_is),
-    row("delay", stamp::delays, stamp::words, as_it_is),
-    row("limit", amplifier::limits, amplifier::limit_words, amplifier::without_limit),
-    row("inductance", amplifier::inductances, amplifier::inductance_words, amplifier::without_inductance),
-    row("drag", force::drags, force::drag_words, force::without),
-    row("stribeck", force::falls, force::fall_words, force::without_fall),
-    Extension { is_curved: true, ..row("lugre", bristles::bend, bristles::words, bristles::without) },
-    row("load", force::loads, force::load_words, as_it_is),
-    row("apart", apart::apart, apart::words, as_it_is),
+    row("spring", On::Axis, gear::springs, gear::spring_words, gear::without),
+    row("play", On::Axis, gear::plays, gear::play_words, gear::without),
+    row("sensor_play", On::Axis, sensor::plays, sensor::words, as_it_is),
+    row("drive", On::Gantry, drive::numbers, drive::words, as_it_is),
+    row("sensor_scale", On::Gantry, sensor::scales, sensor::scale_words, as_it_is),
+    row("delay", On::Any, stamp::delays, stamp::words, as_it_is),
+    row("limit", On::Axis, amplifier::limits, amplifier::limit_words, amplifier::without_limit),
+    row("inductance", On::Any, amplifier::inductances, amplifier::inductance_words, amplifier::without_inductance),
+    row("drag", On::Axis, force::drags, force::drag_words, force::without),
+    row("stribeck", On::Axis, force::falls, force::fall_words, force::without_fall),
+    Extension { is_curved: true, ..row("lugre", On::Axis, bristles::bend, bristles::words, bristles::without) },
+    row("load", On::Axis, force::loads, force::load_words, as_it_is),
+    row("apart", On::Axis, apart::apart, apart::words, as_it_is),
+    Extension { is_curved: true, ..row("yaw", On::Gantry, yaw::bearings, yaw::words, yaw::without) },
 ];
 
 const fn row(
     key: &'static str,
+    on: On,
     tries: fn(&Site) -> Vec<Extended>,
     words: fn(&Site, &Extended, &Fitted) -> Said,
     without: fn(&Site, Machine) -> Machine,
 ) -> Extension {
-    Extension { key, is_curved: false, tries, words, without }
+    Extension { key, on, is_curved: false, tries, words, without }
 }
 
 fn as_it_is(_: &Site, machine: Machine) -> Machine {
@@ -103,7 +113,11 @@ pub(crate) fn cause(case: &Case, plan: &Plan, found: &Searched, law: Option<&Oth
         let standard_errors = known.map_or(0.0, |known| tried.standard_errors(known));
         let better = if standard_errors < CAUSE_ERRORS { None } else { folds.predicts(&tried) };
         if let (Some(known), Some(better)) = (known, better) {
-            return tried.told(&site, known, [explained, standard_errors], better);
+            let rivals = std::mem::take(&mut open).into_iter().filter(|other| tried.may_be_like(known, other));
+            let whole = rivals.filter_map(|other| if other.is_whole() { Some(other) } else { other.advanced(&site) });
+            let others = whole.filter(|other| tried.may_be_like(known, other)).map(|other| other.words(&site));
+            let others: Vec<String> = others.collect();
+            return tried.told(&site, known, ([explained, standard_errors], better), &others);
         }
         // Other starts that led to this minimum are refused with it.
         let is_there =
@@ -117,13 +131,20 @@ pub(crate) fn cause(case: &Case, plan: &Plan, found: &Searched, law: Option<&Oth
 /// others. `goal` is the cost that they have to fall below.
 fn begun<'a>(site: &Site<'_, 'a>, is_curved: bool, goal: f64) -> Vec<Tried<'a>> {
     let before = site.found.best.cost;
-    let rows = EXTENSIONS.iter().filter(|row| row.is_curved == is_curved);
+    let rows = EXTENSIONS.iter().filter(|row| row.is_curved == is_curved && row.on.takes(&site.machine));
     let of = |row: &'static Extension| {
         let tries = (row.tries)(site).into_iter();
         let begun = tries.filter_map(|extended| Tried::begun(site, row, extended, goal));
         begun.filter(|tried| tried.cost() < CAUSE_NEAR * before).collect::<Vec<_>>()
     };
-    let mut ranked: Vec<Tried> = rows.flat_map(of).collect();
+    let mut ranked: Vec<Tried> = Vec::new();
+    for row in rows {
+        ranked.extend(of(row));
+        // Searches in windows take long. Numbers of drives and of sensors, which come next, may resemble each other.
+        if site.is_anew && row.key != "drive" && ranked.iter().any(Tried::is_noise) {
+            break;
+        }
+    }
     ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
     let most = (1.0 - CAUSE_EXPLAINS) * before;
     let mut starts: Vec<(usize, Tried)> = Vec::new();
@@ -144,11 +165,14 @@ fn begun<'a>(site: &Site<'_, 'a>, is_curved: bool, goal: f64) -> Vec<Tried<'a>> 
     starts.into_iter().map(|(_, tried)| tried).collect()
 }
 
-/// True if missing elements are searched for: the residuals are not white, and the fit supports it.
+/// True if missing elements are searched for: the residuals are not white, or, of a machine of several coordinates, above
+/// the noise, and the fit supports it.
 pub(crate) fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool {
     let problem = &found.problem;
-    judged.inflation >= COLOURED
-        && case.machine.has_torque_balance()
+    // Noise of a narrow band, such as the swing of a belt, may determine parameters as well as white noise does.
+    let is_astray = || !case.machine.has_one_coordinate() && !is_noise(problem, &found.best);
+    (judged.inflation >= COLOURED || is_astray())
+        && case.machine.stepper().is_none()
         && plan.windows.is_none()
         && plan.until.is_none()
         && plan.separate.is_empty()

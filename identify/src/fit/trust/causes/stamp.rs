@@ -17,9 +17,11 @@ pub(super) fn delays(site: &Site) -> Vec<Extended> {
     plan.nuisance.delay = Scope::Shared;
     let interval = site.found.problem.runs[0].interval();
     let suspected = suspected_delay(&site.found.problem);
-    let starts = CAUSE_DELAYS.iter().map(|share| share * interval).chain(suspected);
+    // In windows one start leads to either sign.
+    let tried = if site.is_anew { &CAUSE_DELAYS[..1] } else { &CAUSE_DELAYS[..] };
+    let starts = tried.iter().map(|share| share * interval).chain(suspected);
     let of = |delay: f64| {
-        Extended::new(site.with(site.machine.clone()), plan.clone(), Telling::Nuisance(Nuisance::Delay, delay))
+        Extended::new(site.with(site.begins().clone()), plan.clone(), Telling::Nuisance(Nuisance::Delay, delay))
     };
     starts.map(of).collect()
 }

@@ -7,12 +7,12 @@ use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::asked::run::{Extra, Nuisance};
 use crate::fit::limits::{
-    CAUSE_DIFFERENCE, CAUSE_EXPLAINS, CAUSE_REACH, CAUSE_SLOW, CAUSE_SLOW_STEPS, CAUSE_STEPS, COLOURED,
+    CAUSE_ALIKE, CAUSE_DIFFERENCE, CAUSE_EXPLAINS, CAUSE_REACH, CAUSE_SLOW, CAUSE_SLOW_STEPS, CAUSE_STEPS, COLOURED,
     ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS,
 };
 use crate::fit::search::least_squares::{minimise, resume};
 use crate::fit::search::point::{Ending, Minimum, Options};
-use crate::fit::search::starts::is_noise;
+use crate::fit::search::starts::{is_noise, start_in_windows, times_noise};
 use crate::fit::trust::doubts::{Cause, Size};
 use crate::fit::trust::uncertainty::Judged;
 use crate::machine::Machine;
@@ -33,11 +33,17 @@ pub(super) struct Tried<'a> {
 }
 
 impl<'a> Tried<'a> {
-    /// The result of the first steps from the end of the fit without the element; `None` if the model cannot simulate
-    /// the logs. Steps of curved friction, which take long, are not taken where the linear model at the start shows
+    /// The result of the first steps from the end of the fit without the element, or from a search in windows that begins
+    /// with the values of the case; `None` if the model cannot simulate the logs. Steps of curved friction, which take long, are not taken where the linear model at the start shows
     /// that they will not fall below `goal`.
     pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, goal: f64) -> Option<Self> {
         let mut begun = Self::from(site, row, extended, (&site.found.problem, &site.found.best.x))?;
+        if site.is_anew {
+            let Self { extended: Extended { case, plan, .. }, problem, best, .. } = &mut begun;
+            let start = start_in_windows(case, plan, problem, &best.x)?;
+            let bounds = problem.bounds();
+            *best = Minimum::linearised(problem, &start, &bounds)?;
+        }
         let before = site.found.best.cost;
         let gain = before - (begun.cost() - begun.best.promise());
         if row.is_curved && before - CAUSE_REACH * gain > goal {
@@ -135,9 +141,28 @@ impl<'a> Tried<'a> {
         self.best.cost
     }
 
-    /// The row of the table, and the side on which the sensor is.
-    pub fn kind(&self) -> (&'static str, bool) {
-        (self.row.key, self.extended.at_motor)
+    /// The row of the table, the side on which the sensor is, and the number, one of several, that differs.
+    pub fn kind(&self) -> (&'static str, bool, &str) {
+        let name = match &self.extended.telling {
+            Telling::Differs(name) => name,
+            Telling::Nuisance(Nuisance::SensorScale(quantity), _) => quantity.name(),
+            _ => "",
+        };
+        (self.row.key, self.extended.at_motor, name)
+    }
+
+    /// True if its residuals are no larger than the noise of the logs.
+    pub fn is_noise(&self) -> bool {
+        is_noise(&self.problem, &self.best)
+    }
+
+    /// True if the logs may hardly tell another number of a drive or sensor from this one, by the least that its fit may end
+    /// with: with n values, of which slow noise leaves n/i², the logarithm of the likelihood is less by n/i² ln(C′/C)/2.
+    pub fn may_be_like(&self, judged: &Judged, other: &Self) -> bool {
+        let is_number = |one: &Self| !one.kind().2.is_empty();
+        let is_other = is_number(self) && is_number(other) && self.kind() != other.kind();
+        let n = self.problem.counted() as f64 / (judged.inflation * judged.inflation).max(1.0);
+        is_other && n * (other.least().max(0.0) / self.cost()).ln() < CAUSE_ALIKE * CAUSE_ALIKE
     }
 
     /// Information of the logs on it.
@@ -149,7 +174,7 @@ impl<'a> Tried<'a> {
 
     /// True if its residuals are noise: no larger than that of the logs, or white.
     pub fn leaves_noise(&self) -> bool {
-        is_noise(&self.problem, &self.best) || self.judged().is_some_and(|judged| judged.inflation < COLOURED)
+        self.is_noise() || self.judged().is_some_and(|judged| judged.inflation < COLOURED)
     }
 
     /// The machine with the element.
@@ -160,7 +185,9 @@ impl<'a> Tried<'a> {
     /// Index of the variable whose size shows the element.
     fn telling(&self) -> Option<usize> {
         match &self.extended.telling {
-            Telling::Parameter(key) => self.problem.parameters.iter().position(|own| own.name == *key),
+            Telling::Parameter(key) | Telling::Differs(key) => {
+                self.problem.parameters.iter().position(|own| own.name == *key)
+            }
             Telling::Nuisance(what, _) => {
                 let place = self.problem.shared.iter().position(|extra| extra.what == *what);
                 place.map(|place| self.problem.parameters.len() + place)
@@ -184,8 +211,10 @@ impl<'a> Tried<'a> {
         }
         let Some(j) = self.telling() else { return 0.0 };
         let Some(error) = judged.covariance.error(j).filter(|error| *error > 0.0) else { return 0.0 };
+        let differs = matches!(self.extended.telling, Telling::Differs(_));
         match self.problem.shared.get(j.wrapping_sub(self.problem.parameters.len())) {
-            None if self.problem.is_log(j) => 1.0 / error,
+            // The variable is zero at the value of the case.
+            None if self.problem.is_log(j) && !differs => 1.0 / error,
             None => self.best.x[j].abs() / error,
             Some(extra) => self.value(j).abs() / (error * extra.unit),
         }
@@ -219,13 +248,20 @@ impl<'a> Tried<'a> {
         (case, self.extended.plan.clone())
     }
 
-    /// The cause with its sizes; `None` if its sizes are not determined.
+    /// The element in words, without its scatter.
+    pub fn words(&self, site: &Site) -> String {
+        let value = self.telling().map_or(0.0, |j| self.value(j));
+        let fitted = Fitted { machine: self.machine(&self.best.x), sizes: &[], value, scatter: None };
+        (self.row.words)(site, &self.extended, &fitted).words
+    }
+
+    /// The cause with its sizes, and what the logs hardly tell from it; `None` if its sizes are not determined.
     pub fn told(
         &self,
         site: &Site,
         judged: &Judged,
-        [explained, standard_errors]: [f64; 2],
-        better: [usize; 2],
+        ([explained, standard_errors], better): ([f64; 2], [usize; 2]),
+        others: &[String],
     ) -> Option<Cause> {
         let (x, base) = (&self.best.x, &site.found.problem);
         let error = |j: usize| judged.covariance.error(j);
@@ -276,9 +312,26 @@ impl<'a> Tried<'a> {
             value,
             scatter: scatter.map(|[deviation, _]| deviation),
         };
-        let Said { words, add } = (self.row.words)(site, &self.extended, &fitted);
+        let Said { mut words, add } = (self.row.words)(site, &self.extended, &fitted);
+        if !others.is_empty() {
+            words = format!("{words}, or {}, which the logs hardly tell apart,", others.join(", or "));
+        }
+        let belts = judged.identifiability.belts.as_ref().map(|compared| compared.belts.clone());
         let key = self.row.key;
-        Some(Cause { key, words, explained, standard_errors, parameters, estimates, add, better, added })
+        let times_noise = times_noise(&self.problem, &self.best);
+        Some(Cause {
+            key,
+            words,
+            explained,
+            standard_errors,
+            parameters,
+            estimates,
+            belts,
+            times_noise,
+            add,
+            better,
+            added,
+        })
     }
 
     /// The standard error of a function of the variables: √(gᵀ C g), g its gradient.
