@@ -20,7 +20,9 @@ use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::fit::asked::problem::{Problem, Stop};
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
-use crate::fit::limits::{COST_GROWTH, HUBER, NEAREST_ALL, NEAREST_ITERATIONS, NEAREST_ROUNDS, NEAREST_SETTLED};
+use crate::fit::limits::{
+    COST_GROWTH, FAR_BEYOND_NOISE, HUBER, NEAREST_ALL, NEAREST_FAR, NEAREST_ITERATIONS, NEAREST_ROUNDS, NEAREST_SETTLED,
+};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options, cost_of};
 use crate::fit::search::starts::{Effort, Searched, Work, search_as_far};
@@ -102,13 +104,15 @@ pub(crate) fn search_near<'a>(
     let whole = Options::default();
     let mut searched =
         search_as_far(case, plan, stop, &Effort { options: whole, is_straight: false, is_short: false }, watch)?;
+    let is_far = searched.problem.differences > 0 && searched.times_noise().any(|(_, times)| times > FAR_BEYOND_NOISE);
     let Searched { problem, best, work, .. } = &mut searched;
     let huber = if plan.huber { HUBER } else { f64::INFINITY };
-    let options = Options { huber, rounding: problem.rounding(), ..whole };
+    let (rounds, iterations) = if is_far { (1, NEAREST_FAR) } else { (NEAREST_ROUNDS, NEAREST_ITERATIONS) };
+    let options = Options { huber, rounding: problem.rounding(), iterations, evolutions: 0, ..whole };
     let mut seen = None;
     if best.ending != Ending::Interrupted {
         let given = problem.point_of(given);
-        seen = nearest(problem, best, &given, &options, watch, work);
+        seen = nearest(problem, best, &given, (&options, rounds), watch, work);
     }
     let set = problem.as_set(&best.x);
     if set != best.x {
@@ -187,13 +191,12 @@ fn nearest(
     problem: &mut Problem,
     best: &mut Minimum,
     given: &[f64],
-    options: &Options,
+    (options, rounds): (&Options, usize),
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
     work: &mut Work,
 ) -> Option<Judged> {
-    let options = Options { iterations: NEAREST_ITERATIONS, evolutions: 0, ..*options };
     let most = best.cost * (1.0 + NEAREST_ROUNDS as f64 * COST_GROWTH) + f64::MIN_POSITIVE;
-    for _ in 0..NEAREST_ROUNDS {
+    for _ in 0..rounds {
         let none = vec![false; best.x.len()];
         let judged = Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &none)?;
         let lost = judged.identifiability.lost.clone();
@@ -202,7 +205,7 @@ fn nearest(
         }
         let machine = problem.stage_at(&best.x);
         let whole: Vec<f64> = (0..lost.nrows()).map(|j| problem.whole(&machine, j, best.x[j])).collect();
-        let Some(found) = round(problem, best, (given, &whole), &lost, (&options, most), watch, work) else { break };
+        let Some(found) = round(problem, best, (given, &whole), &lost, (options, most), watch, work) else { break };
         let moved = (0..lost.nrows()).map(|j| ((found.x[j] - best.x[j]) / whole[j]).abs()).fold(0.0, f64::max);
         *best = found;
         if moved < NEAREST_SETTLED {
