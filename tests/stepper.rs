@@ -815,6 +815,11 @@ fn logged(folder: &std::path::Path) -> String {
     text
 }
 
+/// A text with plain spaces.
+fn plainly(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
 /// Fits the log of [`logged`] read with this `scale` from values near the truth; the number of simulations, those of the
 /// trials after the search included.
 fn fitted_with(name: &str, scale: &str) -> (taut::Result<Fit>, usize) {
@@ -823,12 +828,12 @@ fn fitted_with(name: &str, scale: &str) -> (taut::Result<Fit>, usize) {
     let text = logged(&folder);
     let [begin, end] = ["[measurement]", "[[experiment]]"].map(|section| text.find(section).unwrap());
     let log = format!(
-        "log = {{ file = \"ramps.csv\", time = \"time_s\", input = \"input_m\", hold = \"linear\", cart_position = \
+        "log = {{ file = \"ramps.csv\", time = \"time_s\", input = \"position_m\", hold = \"linear\", cart_position = \
          \"cart_position_m\", scale = {{ {scale} }} }}\n"
     );
     let text = format!("{}[[experiment]]\nname = \"ramps\"\n{log}", &text[..begin.min(end)])
-        .replace("holding_torque = 0.45", "holding_torque = 0.4")
-        .replace("mass = 0.4", "mass = 0.45")
+        .replace("holding_torque = 0.45", "holding_torque = 0.43")
+        .replace("mass = 0.4", "mass = 0.41")
         + "[fit]\nfree = [\"stepper.holding_torque\", \"cart.mass\", \"cart.friction.coulomb\"]\n";
     let path = folder.join("off.toml");
     std::fs::write(&path, &text).unwrap();
@@ -852,25 +857,25 @@ fn a_reversed_encoder_of_a_stepper_is_named_within_its_budget() {
     let found = found.unwrap();
     println!("{simulations} simulations");
     assert!(found.findings.iter().any(|one| one.code == "sign" && one.grade == Grade::Warning), "{:?}", found.findings);
-    assert!(simulations < 1500, "{simulations}");
+    assert!(simulations < 600, "{simulations}");
 }
 
 /// Each of 28 factors took steps from two starts, those on the command at speeds that no motor reaches.
 #[test]
 fn a_factor_on_the_output_of_a_stepper_is_named_within_its_budget() {
-    let (found, simulations) = fitted_with("factor", "cart_position = 0.1");
+    let (found, simulations) = fitted_with("factor", "cart_position = 10");
     let found = found.unwrap();
     println!("{simulations} simulations");
-    let named = |one: &Finding| one.code == "unexplained" && one.text.contains("with cart_position times 10 ");
+    let named = |one: &Finding| one.code == "unexplained" && one.text.contains("with cart_position times 0.1 ");
     assert!(found.findings.iter().any(named), "{:?}", found.findings);
-    assert!(simulations < 1500, "{simulations}");
+    assert!(simulations < 1200, "{simulations}");
 }
 
 /// A command in millimetres was simulated for minutes, turn after turn of the field.
 #[test]
 fn a_command_at_speeds_without_torque_is_refused() {
     let (found, simulations) = fitted_with("outrun", "input = 1000");
-    let told = found.unwrap_err().to_string();
+    let told = plainly(&found.unwrap_err().to_string());
     assert!(told.starts_with("the command of the log \"ramps\" reaches 160 m/s"), "{told}");
     assert!(told.contains("allowed: up to ") && told.contains("next: check the unit and the scale"), "{told}");
     assert!(simulations < 100, "{simulations}");
@@ -909,7 +914,7 @@ fn a_stepper_is_fitted_from_a_holding_torque_and_a_mass_that_are_far_off() {
 fn suggested_accelerations_keep_the_reserve_of_a_plan_to_the_pull_out_torque() {
     let (radius, coulomb, viscous, way) = (6.4e-3, 2.0, 3.0, 0.22);
     let rest = format!(
-        "[travel]\nmax = {way}\n[cart]\nmass = 0.4\nfriction = {{ viscous = {viscous}, coulomb = {coulomb} }}\n"
+        "[travel]\nmin = 0\nmax = {way}\n[cart]\nmass = 0.4\nfriction = {{ viscous = {viscous}, coulomb = {coulomb} }}\n"
     );
     let text = plain(0.45, radius, 16, &rest);
     let case = Case::from_text("shaped.toml", &text).unwrap();
@@ -957,7 +962,7 @@ fn a_supply_below_what_rated_current_needs_is_told_with_both_voltages() {
         let text = plain(0.45, 6.4e-3, microsteps, "[cart]\nmass = 0.4\n")
             .replace("supply = 24", &format!("supply = {supply}\ndrive = \"{drive}\""));
         let case = Case::from_text("supply.toml", &text).unwrap();
-        let found = short_supply(&case.machine);
+        let found = short_supply(&case.machine).map(|found| plainly(&found));
         match (&found, told) {
             (Some(found), Some([given, needed])) => {
                 assert!(found.starts_with(&format!("the supply of {given} is below the {needed} ")), "{found}");

@@ -521,7 +521,7 @@ pub(crate) const NEAREST_ALL: f64 = 0.99;
 /// Unit: Jacobians. Source: chosen.
 pub(crate) const NEAREST_ITERATIONS: usize = 40;
 
-/// The same for the single round after a search by differences whose residuals are far above the noise: what the model
+/// The same for the single try after a search by differences whose residuals are far above the noise: what the model
 /// does not explain is no reason to choose among its values.
 ///
 /// Unit: Jacobians. Source: chosen: bounds the time. Test: `a_reversed_encoder_of_a_stepper_is_named_within_its_budget`.
