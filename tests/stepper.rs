@@ -937,7 +937,7 @@ fn suggested_accelerations_keep_the_reserve_of_a_plan_to_the_pull_out_torque() {
             changes: changes.iter().map(|own| own.to_string()).collect(),
             ..Default::default()
         };
-        let found = recommend(&question, &[path.clone()]).unwrap();
+        let found = recommend(&question, std::slice::from_ref(&path)).unwrap();
         let choice = &found.each[0].choice;
         let single = choice.fitted.iter().map(|one| one.max_acceleration);
         single.chain(choice.pairs.iter().map(|one| one.max_acceleration)).fold(0.0, f64::max)
