@@ -43,7 +43,7 @@ fn main() -> Result<()> {
     let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(LIMIT), lead: 0.0 };
     let (closed, at) = best(calls, || {
         let run = close(&case.machine, &mut [&mut Proportional], &timing, &path, 1.0, 50e-6, Solver::Exact)?;
-        Ok(run.figures.cart().error.last + path[0].target())
+        Ok(path[0].target() - run.figures.cart().error.last)
     })?;
     let start = Simulator::new(&case.machine, Solver::Exact)?;
     let (radius, shaft) = (case.machine.pulley_radius, start.mechanism().drives[0].shaft);

@@ -106,6 +106,16 @@ pub struct Note {
     pub text: String,
 }
 
+impl Note {
+    /// The code of a supply that is below what the rated current of a stepper needs.
+    const SUPPLY: &str = "low-supply";
+
+    /// True if figures of the machine do not hold, rather than being incomplete.
+    pub fn is_warning(&self) -> bool {
+        self.code == Self::SUPPLY
+    }
+}
+
 impl Overview {
     /// Of the machine of a case. Errors: a machine whose linear system does not exist at its places.
     ///
@@ -129,6 +139,7 @@ impl Overview {
         groups.push(inertia::inertia(machine, &directions, &mut notes));
         groups.extend(belt::belt(machine, &directions, (&origin, &places)));
         groups.extend(limits::limits(case, &directions, &origin, &mut notes));
+        notes.extend(stepper::supply(machine));
         drive::constants(machine, &mut notes);
         belt::notes(machine, &mut notes);
         notes.extend(case.shortfalls().iter().map(|(name, short)| {

@@ -129,7 +129,18 @@ fn a_known_change_between_campaigns_is_named() {
         assert!(own.is_some_and(|(_, found)| (found / value - 1.0).abs() < 0.03), "{change}: {best:?}");
         let unchanged = found.unchanged[0].rmse;
         assert!(found.changes[0].errors[0].rmse < 0.2 * unchanged, "{change}: {unchanged} {:?}", found.changes[0]);
-        assert!(found.changes.len() > 10);
+        assert!(found.changes.len() > 10 && found.is_changed() && found.best().next().unwrap().is_shown());
+    }
+}
+
+/// The logs of a machine that had not changed gave a list of 35 changes that explain nothing.
+#[test]
+fn of_a_machine_that_did_not_change_no_change_is_shown() {
+    for seed in 1..=3 {
+        let case = made(&[], seed);
+        let found = drift(&case, &plan(&["cart.mass"]), None, &mut |_| Flow::Continue).unwrap();
+        let shown: Vec<_> = found.changes.iter().filter(|change| change.is_shown()).collect();
+        assert!(found.changes.len() > 10 && !found.is_changed(), "{shown:?}");
     }
 }
 

@@ -182,7 +182,7 @@ impl Curves {
         let slides: Vec<&str> = geometry.slides.iter().map(|slide| geometry.label(slide.body).key).collect();
         let is_alone = slides.len() == 1;
         let curve = |name, column: String| Shown { name, column };
-        let error = |key| curve(if is_alone { "x − y" } else { key }, format!("{key}_error"));
+        let error = |key| curve(if is_alone { "y − x" } else { key }, format!("{key}_error"));
         let position = |key| {
             let reference = if is_alone { "reference".into() } else { format!("{key}_reference") };
             [curve("reference", reference), curve(key, format!("{key}_position"))]

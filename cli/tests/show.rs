@@ -221,3 +221,21 @@ fn details_are_printed_only_if_asked_for() {
 fn named(text: &str, name: &str) -> bool {
     text.lines().any(|line| line.trim_start().starts_with(name))
 }
+
+/// A supply below what rated current needs was mentioned by no command.
+#[test]
+fn a_low_supply_of_a_stepper_is_a_warning_of_all_commands_that_run_it() {
+    let case = "stages/stepper-axis/stepper-axis.toml";
+    for (command, changes) in [("show", &[][..]), ("simulate", &["--experiment", "20 mm in 33 ms"]), ("move", &[])] {
+        let said = |supply: &str| {
+            let output = taut(&[&[command, case, "--set", supply], changes].concat());
+            format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
+        };
+        let low = said("stepper.supply=3 V").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            low.contains("warning: the supply of 3 V is below the 3.96 V that the rated current"),
+            "{command}: {low}"
+        );
+        assert!(!said("stepper.supply=24 V").contains("the supply of"), "{command}");
+    }
+}

@@ -67,7 +67,7 @@ impl Instance {
             Role::Output(column) => self.columns()?.get(column).copied().unwrap_or(0.0),
             Role::Error(slide) => {
                 let reference = self.inputs[REFERENCES * slide].at(self.time);
-                self.load_position(slide)? - reference
+                reference - self.load_position(slide)?
             }
             Role::Command(drive) => {
                 self.prepare()?;
@@ -306,7 +306,7 @@ impl Instance {
                 Role::Error(slide) => {
                     let load = of(Shown::Position(self.model.loads[slide], 1.0));
                     let reference = self.inputs[REFERENCES * slide].derivative(self.time, order);
-                    load.map_or(0.0, |column| values[column]) - reference
+                    reference - load.map_or(0.0, |column| values[column])
                 }
                 // The controller's command is held, and is no continuous output; nothing else is an output.
                 _ => 0.0,

@@ -45,10 +45,10 @@ pub fn run(subject: &Subject) -> Result<Answer, String> {
             row[bridge] = Double::from(column("final_bridge_position")?) - machine.origin[bridge];
             row[cart] = Double::from(column("final_cart_position")?) - machine.origin[cart];
         }
-        // x = y + error
+        // x = y − error
         Subject::Loop(case) => {
             let y = case.moves[0].profile().at(case.moves[0].until).position;
-            row[1] = Double::from(column("final_cart_error")?) + Double::from(y) - machine.origin[1];
+            row[1] = Double::from(y) - Double::from(column("final_cart_error")?) - machine.origin[1];
         }
         Subject::Axis(_) => {
             row[0] = Double::from(column("final_drive_travel")?) - machine.origin[0];

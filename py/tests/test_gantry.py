@@ -116,13 +116,13 @@ def test_moves_in_the_plane(root):
     figures = run.metrics
     errors = [figures["loads"][part]["error"]["peak_m"] for part in ("bridge", "cart")]
     for part, peak in zip(("bridge", "cart"), errors):
-        assert run[f"{part}_error"] == pytest.approx(run[f"{part}_position"] - run[f"{part}_reference"])
+        assert run[f"{part}_error"] == pytest.approx(run[f"{part}_reference"] - run[f"{part}_position"])
         assert 0 <= abs(peak) - np.abs(run[f"{part}_error"]).max() < 2e-6
     assert abs(figures["contour_error"]["peak_m"]) == pytest.approx(np.abs(run["contour_error"]).max(), abs=2e-6)
     assert set(figures["drives"]) == {"left", "right"} and "cart_error" not in figures
-    # Along a leg without a stop the distance from the path is the other coordinate's error.
+    # Along a leg without a stop the distance from the path, positive to its left, is minus the other coordinate's error.
     first = run["time"] < 0.15
-    assert run["contour_error"][first] == pytest.approx(run["cart_error"][first], abs=1e-15)
+    assert run["contour_error"][first] == pytest.approx(-run["cart_error"][first], abs=1e-15)
     assert case.move("square", spread=0.1).metrics["spread"]["axes"] == 20
 
 

@@ -119,7 +119,7 @@ def test_moves_are_the_command_lines(root, pid):
     runs = pid.move(spread=0.1)
     assert runs.data == told
     assert runs[0].units["cart_error"] == "m"
-    assert runs[0]["cart_position"] - runs[0]["reference"] == pytest.approx(runs[0]["cart_error"])
+    assert runs[0]["reference"] - runs[0]["cart_position"] == pytest.approx(runs[0]["cart_error"])
 
 
 def test_a_controller_may_be_a_function(pid):

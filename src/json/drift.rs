@@ -28,6 +28,7 @@ fn change(change: &Change) -> Value {
         "to": number(estimate.value),
         "standard_error": estimate.error.map_or(Value::Null, number),
         "at_bound": estimate.at_bound,
+        "shown": change.is_shown(),
         "left": number(change.left),
         "errors": errors(&change.errors),
     })
@@ -39,6 +40,7 @@ pub fn drift(case: &Case, drift: &Drift) -> Value {
         "schema": super::identity("drift"),
         "title": case.title,
         "version": env!("CARGO_PKG_VERSION"),
+        "changed": drift.is_changed(),
         "unchanged": errors(&drift.unchanged),
         "changes": drift.changes.iter().map(change).collect::<Vec<_>>(),
         "work": {

@@ -52,6 +52,7 @@ fn one(found: &ShaperFile) -> Value {
             "tested_dampings": criterion.tested,
             "corner_acceleration": criterion.corner.acceleration,
             "corner_speed": criterion.corner.speed,
+            "motor_acceleration": criterion.motor_acceleration,
             "max_smoothing": criterion.max_smoothing,
             "max_vibrations": criterion.max_vibrations,
         },
@@ -74,7 +75,7 @@ fn one(found: &ShaperFile) -> Value {
             };
             value["spectra"] = spectra.iter().map(one).collect();
         }
-        Source::Model { title, coordinate, drive, modes } => {
+        Source::Model { title, coordinate, drive, modes, .. } => {
             let mode = |mode: &Resonance| json!({ "position": mode.position, "frequency": mode.frequency, "damping": mode.damping, "share": mode.share });
             let drive = if *drive == Drive::Held { "held" } else { "free" };
             value["model"] = json!({

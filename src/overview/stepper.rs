@@ -1,9 +1,9 @@
 //! Overview of a stepper: its constants, the torque that its field loses it at, and the largest acceleration.
 
-use super::Group;
+use super::{Group, Note};
 use crate::machine::{Amplifier, AmplifierMode, Machine, Motor};
 use crate::number::engineering;
-use crate::reach::pull_out::PullOut;
+use crate::reach::pull_out::{PullOut, short_supply};
 use std::f64::consts::PI;
 
 /// Speeds at the belt that pull-out torques are given at, m/s.
@@ -37,6 +37,11 @@ pub(super) fn drive(machine: &Machine) -> Group {
     let hertz = (stiffness / mass).sqrt() / (2.0 * PI);
     group.add("field_resonance", "resonance of all on the field", hertz, "Hz").how("as one mass");
     group
+}
+
+/// A supply that does not suffice for the rated current.
+pub(super) fn supply(machine: &Machine) -> Option<Note> {
+    short_supply(machine).map(|text| Note { code: Note::SUPPLY, text })
 }
 
 pub(super) fn limits(machine: &Machine) -> Option<Group> {

@@ -87,12 +87,12 @@ pub(super) const IN_STEP: &str = "in_step";
 /// Those of a move in closed loop, in the order of the columns.
 #[rustfmt::skip]
 const OF_MOVE: &[Row] = &[
-    row(["peak_cart_error", "peak_*_error"], "m", ["largest cart error x − y", "largest error of the *"], Per::Load, |m, k| m.figures.loads[k].error.peak.value.abs()),
+    row(["peak_cart_error", "peak_*_error"], "m", ["largest cart error y − x", "largest error of the *"], Per::Load, |m, k| m.figures.loads[k].error.peak.value.abs()),
     row(["rms_cart_error", "rms_*_error"], "m", ["rms of the cart error", "rms of the error of the *"], Per::Load, |m, k| m.figures.loads[k].error.rms),
     row(["final_cart_error", "final_*_error"], "m", ["cart error at the end", "error of the * at the end"], Per::Load, |m, k| m.figures.loads[k].error.last),
     row(["peak_contour_error"; 2], "m", ["largest distance from the path"; 2], Per::Plane, |m, _| m.figures.contour.map_or(f64::NAN, |contour| contour.peak.value.abs())),
     row(["rms_contour_error"; 2], "m", ["rms of the distance from the path"; 2], Per::Plane, |m, _| m.figures.contour.map_or(f64::NAN, |contour| contour.rms)),
-    row(["peak_following_error", "peak_*_following_error"], "m", ["largest following error r φ₁ − y", "largest following error of the *"], Per::Drive, |m, k| m.figures.drives[k].following.peak.value.abs()),
+    row(["peak_following_error", "peak_*_following_error"], "m", ["largest following error y − r φ₁", "largest following error of the *"], Per::Drive, |m, k| m.figures.drives[k].following.peak.value.abs()),
     row(["rms_following_error", "rms_*_following_error"], "m", ["rms of the following error", "rms of the following error of the *"], Per::Drive, |m, k| m.figures.drives[k].following.rms),
     row(["settling_time"; 2], "s", ["settling time after the profile"; 2], Per::Whole, |m, _| m.figures.settling.unwrap_or(f64::NAN)),
     row(["overshoot", "*_overshoot"], "m", ["overshoot of the cart", "overshoot of the *"], Per::Load, |m, k| m.figures.loads[k].overshoot),

@@ -52,7 +52,7 @@ class Tune {
     this.gains = element("div", {class: "groups gains"});
     this.margins = element("dl", {class: "figures", id: "margins"});
     this.figures = element("dl", {class: "figures", id: "move-figures"});
-    this.error = new Picture("Cart minus reference", {
+    this.error = new Picture("Reference minus cart", {
       x: "Time",
       xUnit: "s",
       y: "Error",

@@ -16,6 +16,7 @@ use taut::design::Design;
 use taut::files::write_atomically;
 use taut::json::{self, Moved};
 use taut::reach::feasible::sentence;
+use taut::reach::pull_out::short_supply;
 use taut::solve::{Flow, Solver};
 use taut::trajectory::{CsvWriter, Trajectory};
 use taut::tune::trouble;
@@ -74,6 +75,7 @@ pub fn run(args: &Args) -> Outcome {
         finished.files.push(("case.toml".into(), text));
     }
     (finished.status, finished.remarks) = status(&tried, &interrupt);
+    finished.remarks.extend(cases.iter().filter_map(|case| short_supply(&case.machine)).map(Remark::Warning));
     finished.finish(common, folder)
 }
 

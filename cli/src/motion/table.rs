@@ -78,10 +78,10 @@ pub fn comparison(tried: &[Tried]) -> String {
         text.push('\n');
     }
     text.push_str(
-        "cart, rms: x − y; following: r φ₁ − y, at most; settles: after the end of the profile; current, voltage: rms",
+        "cart, rms: y − x; following: y − r φ₁, at most; settles: after the end of the profile; current, voltage: rms",
     );
     text.push_str(if spread {
-        "\noff: with each parameter of the axis off, one at a time: largest |x − y|, and how many settle\n"
+        "\noff: with each parameter of the axis off, one at a time: largest |y − x|, and how many settle\n"
     } else {
         "\n"
     });

@@ -30,7 +30,8 @@ pub fn text(overview: &Overview, is_verbose: bool) -> String {
     }
     text.push('\n');
     for note in &overview.notes {
-        let _ = writeln!(text, "note: {}", typed(&note.text));
+        let word = if note.is_warning() { "warning" } else { "note" };
+        let _ = writeln!(text, "{word}: {}", typed(&note.text));
     }
     let hidden = overview.rows().filter(|row| !row.is_main()).count();
     if !is_verbose && hidden > 0 {

@@ -19,6 +19,7 @@ use taut::case::{Case, Files};
 use taut::files::Claim;
 use taut::json::{self, Simulation};
 use taut::machine::Machine;
+use taut::reach::pull_out::short_supply;
 use taut::solve::{self, Ending, Solver};
 use taut::{Error, Result};
 use taut_report::simulate::{SimulatedExperiment, early_end, hidden, report, yawed};
@@ -125,6 +126,7 @@ fn simulate(args: &Simulate, path: &Path, case: &Case) -> Outcome {
         })
         .collect();
     (finished.status, finished.remarks) = status(&ended, solver, &interrupt);
+    finished.remarks.extend(short_supply(&case.machine).map(Remark::Warning));
     finished.finish(common, folder)
 }
 

@@ -1,7 +1,7 @@
 //! Criteria for choosing shapers: residual vibration, smoothing, and the score of both.
 
 use super::kind::{ShaperKind, TOLERANCE};
-use super::shaper::{Corner, Firmware, Form, Shaper, USUAL_DAMPING, check_damping};
+use super::shaper::{Corner, Firmware, Form, Shaper, USUAL_DAMPING, check_damping, max_acceleration};
 use super::spectrum::Spectrum;
 use crate::error::Result;
 use crate::reach::resonance::Resonance;
@@ -40,6 +40,8 @@ pub struct Criterion {
     pub tested: Vec<f64>,
     /// The corner at which smoothing is compared.
     pub corner: Corner,
+    /// Largest acceleration that the motors give, m/s²; suggested ones are not above it.
+    pub motor_acceleration: Option<f64>,
     /// Largest allowed smoothing, m.
     pub max_smoothing: Option<f64>,
     /// Largest desired vibration relative to that without a shaper.
@@ -64,6 +66,7 @@ impl Default for Criterion {
             damping: 0.0,
             tested: Vec::new(),
             corner: Corner::default(),
+            motor_acceleration: None,
             max_smoothing: None,
             max_vibrations: None,
             firmware: Firmware::default(),
@@ -77,6 +80,13 @@ impl Default for Criterion {
 }
 
 impl Criterion {
+    /// Largest acceleration to suggest with these impulses, m/s²: smoothing stays within [`ALLOWED_SMOOTHING`], and the
+    /// motors give it.
+    pub(super) fn max_acceleration(&self, impulses: &[(f64, f64)]) -> f64 {
+        let smoothed = max_acceleration(impulses, ALLOWED_SMOOTHING, self.corner.speed);
+        self.motor_acceleration.map_or(smoothed, |most| smoothed.min(most))
+    }
+
     /// Designs for a damping ratio ζ; a spectrum is still evaluated at the usual ratios, as Klipper does.
     pub fn designed_for(mut self, damping: f64) -> Result<Self> {
         check_damping(damping)?;

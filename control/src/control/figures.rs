@@ -74,7 +74,7 @@ impl Figures {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct LoadFigures {
-    /// x − y: deviation from its reference.
+    /// Its error y − x: reference minus position.
     pub error: Deviation,
     /// Overshoot beyond its target after the start of the last stroke, m.
     pub overshoot: f64,
@@ -84,8 +84,8 @@ pub struct LoadFigures {
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[non_exhaustive]
 pub struct DriveFigures {
-    /// r φ − y: deviation of its pulley from the reference of its part of the belt. A controller that compensates for
-    /// the belt's elongation causes part of it on purpose.
+    /// y − r φ: reference of its part of the belt minus the travel of its pulley. A controller that compensates for the
+    /// belt's elongation causes part of it on purpose.
     pub following: Deviation,
     /// Motor current: peak and RMS, A.
     pub current: (Peak, f64),

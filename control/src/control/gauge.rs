@@ -286,8 +286,8 @@ impl<'a> Gauge<'a> {
         {
             let x = curve.polynomial(load.position);
             *place = x;
-            // x − y
-            *error = Polynomial(std::array::from_fn(|k| x.0[k] - reference.0[k]));
+            // e = y − x
+            *error = Polynomial(std::array::from_fn(|k| reference.0[k] - x.0[k]));
             larger(&mut load.seen.error.peak, error, part, curve);
             load.square += curve.length * square(error, part);
             if let (Some(peak), false) = (&mut load.peak_speed, self.is_brief) {
@@ -298,13 +298,13 @@ impl<'a> Gauge<'a> {
             return;
         }
         for drive in &mut self.drives {
-            // r φ − y as a sum of x − y and the elongations between; r φ₁ − y = x − y + d₁ of an axis
+            // y − r φ as a sum of y − x less the elongations between; y − r φ₁ = y − x − d₁ of an axis
             let mut following = Polynomial([0.0; TERMS]);
             for ((load, error), share) in self.loads.iter().zip(&errors).zip(drive.shares) {
                 following.0.iter_mut().zip(error.0).for_each(|(sum, term)| *sum += share * term);
                 for &(stretch, weight) in &load.stretches {
                     let stretch = curve.polynomial(stretch);
-                    following.0.iter_mut().zip(stretch.0).for_each(|(sum, term)| *sum += share * weight * term);
+                    following.0.iter_mut().zip(stretch.0).for_each(|(sum, term)| *sum -= share * weight * term);
                 }
             }
             larger(&mut drive.seen.following.peak, &following, part, curve);
@@ -422,12 +422,12 @@ impl Observe for Gauge<'_> {
         let mut references = [0.0; SLIDES];
         for ((load, profile), reference) in self.loads.iter_mut().zip(self.profiles).zip(&mut references) {
             *reference = profile.at(time).position;
-            load.seen.error.last = state.position[load.body] - *reference;
+            load.seen.error.last = *reference - state.position[load.body];
         }
         let radius = self.meter.machine().pulley_radius;
         for drive in &mut self.drives {
             let y: f64 = drive.shares.iter().zip(references).map(|(share, reference)| share * reference).sum();
-            drive.seen.following.last = radius * state.position[drive.pulley] - y;
+            drive.seen.following.last = y - radius * state.position[drive.pulley];
         }
         if let (Some(contour), [x, y]) = (&mut self.contour, &self.loads[..]) {
             contour.end(time, [x.body, y.body].map(|body| state.position[body]));

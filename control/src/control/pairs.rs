@@ -5,8 +5,8 @@
 //! W. Singhose, E. Crain, W. Seering, "Convolved and simultaneous two-mode input shapers", *IEE Proceedings - Control
 //! Theory and Applications* 144 (1997) 515-520.
 
-use super::criterion::{ALLOWED_SMOOTHING, Criterion, Target, score};
-use super::shaper::{Form, Pattern, Shaper, max_acceleration, smoothing};
+use super::criterion::{Criterion, Target, score};
+use super::shaper::{Form, Pattern, Shaper, smoothing};
 
 /// Number of frequencies tried for each shaper, at equal ratios.
 const GRID: usize = 40;
@@ -31,7 +31,7 @@ pub struct Pair {
     pub vibration: f64,
     /// Smoothing at the criterion's corner, m.
     pub smoothing: f64,
-    /// Greatest acceleration with at most [`ALLOWED_SMOOTHING`], m/s².
+    /// Greatest acceleration with at most [`super::criterion::ALLOWED_SMOOTHING`] that the motors give, m/s².
     pub max_acceleration: f64,
     /// The score, to be compared with that of single shapers: smaller is better.
     pub score: f64,
@@ -128,7 +128,7 @@ fn pair(one: &Shaper, other: &Shaper, vibration: f64, criterion: &Criterion) -> 
     }
     let mut parts = [one.clone(), other.clone()];
     parts.sort_by(|a, b| a.frequency.total_cmp(&b.frequency));
-    let max_acceleration = max_acceleration(&impulses, ALLOWED_SMOOTHING, criterion.corner.speed);
+    let max_acceleration = criterion.max_acceleration(&impulses);
     Some(Pair { parts, vibration, smoothing, max_acceleration, score: score(smoothing, vibration) })
 }
 

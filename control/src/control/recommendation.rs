@@ -11,6 +11,7 @@ use crate::case::{Accepted, Case, Files};
 use crate::error::{Error, Result};
 use crate::log::read_accelerometer;
 use crate::mechanism::Label;
+use crate::reach::quickest::within_pull_out;
 use crate::reach::resonance::{Drive, Reach, Resonance, reaches, resonances};
 use std::path::{Path, PathBuf};
 
@@ -34,6 +35,9 @@ pub enum Source {
         drive: Drive,
         /// Modes at all positions.
         modes: Vec<Resonance>,
+        /// Largest acceleration that steppers give, m/s²: [`within_pull_out`], rounded down to 0.1 m/s²; `None` for other
+        /// motors.
+        acceleration: Option<f64>,
     },
 }
 
@@ -255,6 +259,9 @@ fn chosen(args: &Question, file: &Path, source: Source, also: Vec<PathBuf>) -> R
     if let Some(speed) = args.corner_speed {
         criterion.corner.speed = speed;
     }
+    if let Source::Model { acceleration, .. } = &source {
+        criterion.motor_acceleration = *acceleration;
+    }
     let mode = match &source {
         Source::Spectrum(spectrum) => fitted(spectrum),
         Source::Spectra(spectra) => {
@@ -318,7 +325,9 @@ fn model(args: &Question, file: &Path) -> Result<(Vec<Source>, Vec<PathBuf>)> {
     let of_coordinate = |(number, (label, letter)): (usize, (&Label, &'static str))| {
         let modes = resonances(&case.machine, drive, number).map_err(|e| e.in_file(file))?;
         let coordinate = (labels.len() > 1).then_some(Coordinate { label: *label, letter });
-        Ok(Source::Model { title: case.title.clone(), coordinate, drive, modes })
+        // Suggested accelerations are printed to 100 mm/s².
+        let acceleration = within_pull_out(&case.machine, number).map(|most| (10.0 * most).floor() / 10.0);
+        Ok(Source::Model { title: case.title.clone(), coordinate, drive, modes, acceleration })
     };
     let sources = labels.iter().zip(["x", "y"]).enumerate().map(of_coordinate).collect::<Result<_>>()?;
     Ok((sources, case.files.iter().map(|file| file.path.clone()).collect()))
@@ -465,7 +474,7 @@ impl ShaperFile {
                 let peaks: Vec<String> = spectrum.peaks().iter().map(peak).collect();
                 format!("{}; axis {}; peaks at {}", spectrum.origin, spectrum.axis.word(), peaks.join(", "))
             }
-            Source::Model { title, coordinate, drive, modes } => {
+            Source::Model { title, coordinate, drive, modes, acceleration } => {
                 let (motor, load) = match coordinate {
                     None => ("motor", "cart".to_string()),
                     Some(Coordinate { label, letter }) => ("motors", format!("{} ({letter})", label.name)),
@@ -485,8 +494,13 @@ impl ShaperFile {
                     _ => format!("{low:.1} to {high:.1} Hz along the travel"),
                 };
                 let damping = damping(modes);
+                let gives = acceleration.map(|most| {
+                    let give = if coordinate.is_some() { "give" } else { "gives" };
+                    format!("; the {motor} {give} {most:.1} m/s² over the travel, with the reserve of a plan")
+                });
                 format!(
-                    "the model of \"{title}\", {motor} {word}; the {load} vibrates at {range}, damping ratio {damping:.3}"
+                    "the model of \"{title}\", {motor} {word}; the {load} vibrates at {range}, damping ratio {damping:.3}{}",
+                    gives.unwrap_or_default()
                 )
             }
         }

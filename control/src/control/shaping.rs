@@ -21,7 +21,7 @@ pub struct Fitted {
     pub vibration: f64,
     /// Smoothing at the criterion's corner, m.
     pub smoothing: f64,
-    /// Greatest acceleration with at most [`ALLOWED_SMOOTHING`], m/s².
+    /// Greatest acceleration with at most [`ALLOWED_SMOOTHING`] that the motors give, m/s².
     pub max_acceleration: f64,
     /// Score, smaller is better: smoothing in mm times a measure of the vibration.
     pub score: f64,
@@ -205,7 +205,7 @@ impl Tried {
             shaper: point.shaper.clone(),
             vibration: point.vibration,
             smoothing: point.smoothing,
-            max_acceleration: point.shaper.max_acceleration(ALLOWED_SMOOTHING, criterion.corner.speed),
+            max_acceleration: criterion.max_acceleration(point.shaper.impulses()),
             score: point.score,
             is_candidate: criterion.candidates.contains(&self.pattern.form),
             is_lowest: self.lowest == Some(point.shaper.frequency),

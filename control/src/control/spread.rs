@@ -25,11 +25,11 @@ pub fn spread(machine: &Machine, share: f64) -> Vec<(String, Machine)> {
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct Worst {
-    /// Largest |x − y|, m; infinite if a run ends early.
+    /// Largest |y − x|, m; infinite if a run ends early.
     pub error: f64,
     /// The parameter changed on that axis, and its change.
     pub axis: String,
-    /// Largest |x − y| at the end, m.
+    /// Largest |y − x| at the end, m.
     pub last: f64,
     /// Axes on which the cart settles.
     pub settled: usize,

@@ -45,7 +45,7 @@ impl Wide {
         let references: Vec<Vec<f64>> =
             profiles.iter().map(|profile| time.iter().map(|&t| profile.at(t).position).collect()).collect();
         let error = |(names, reference): (&[String; 3], &Vec<f64>)| -> Vec<f64> {
-            place(names).iter().zip(reference).map(|(x, y)| x - y).collect()
+            place(names).iter().zip(reference).map(|(x, y)| y - x).collect()
         };
         let errors: Vec<Vec<f64>> = self.loads.iter().zip(&references).map(error).collect();
         let away: Option<Vec<f64>> = match (&mut self.contour, &self.loads[..]) {

@@ -37,13 +37,13 @@ pub struct MoveVerdict {
     pub name: String,
     /// Distance from the target within which the cart counts as settled, m.
     pub window: f64,
-    /// x − y on the nominal machine.
+    /// y − x on the nominal machine.
     pub cart: Deviation,
     /// Settling time, s, if the cart settles.
     pub settling: Option<f64>,
     /// RMS current, A.
     pub current: f64,
-    /// Worst-case |x − y|, m, and its machine.
+    /// Worst-case |y − x|, m, and its machine.
     pub worst: (f64, String),
     /// Number of machines on which it settles, and of all machines.
     pub settled: (usize, usize),
@@ -99,7 +99,7 @@ impl Limit {
 /// A worst-case figure of a move over the family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Figure {
-    /// |x − y|, m.
+    /// |y − x|, m.
     Error,
     /// Settling time, s.
     Settling,

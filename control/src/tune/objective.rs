@@ -44,9 +44,9 @@ pub(crate) const BALANCES: [Balance; 3] = [
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct MoveFigures {
-    /// Largest |x − y| of all slides, m; infinite if the run ends early.
+    /// Largest |y − x| of all slides, m; infinite if the run ends early.
     pub error: f64,
-    /// RMS of x − y, m, largest of all slides.
+    /// RMS of y − x, m, largest of all slides.
     pub rms: f64,
     /// Settling time from the end of the profile, s.
     pub settling: Option<f64>,

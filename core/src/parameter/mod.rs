@@ -79,7 +79,7 @@ pub enum Tuned {
 pub enum Off {
     /// Not varied: it is counted, chosen or set.
     No,
-    /// Separately, and only if everything is varied, since positions are measured with it.
+    /// Separately, and only if everything is varied: a length that positions are measured with, a setting of a driver.
     Alone,
     /// Together with all others of this name, to which it is physically linked: a motor has one constant, and pulleys
     /// are of one kind. `--vary all` varies each separately.
@@ -294,6 +294,14 @@ pub fn all() -> impl Iterator<Item = &'static Parameter> {
 /// The parameter with this key.
 pub fn find(key: &str) -> Option<&'static Parameter> {
     all().find(|p| p.key == key)
+}
+
+/// The default of the parameter with this key, in SI; `None` if it has none that is a number.
+pub fn default_of(key: &str) -> Option<f64> {
+    match find(key)?.default {
+        Fallback::Value(value) => Some(value),
+        Fallback::Required | Fallback::Words(_) => None,
+    }
 }
 
 /// The parameter of a key with list indices: `belt.stiffness.0` and `cart.friction.along.1.factor` are of

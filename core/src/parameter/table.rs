@@ -446,13 +446,13 @@ const STEPPER: &[Parameter] = &[
     row("stepper.holding_torque", "T_h", "N m", Required, POSITIVE, "0.45 N m", "Holding torque with both phases at rated current; K_m = T_h/(√2 I).")
         .at(of_drive!(motor, |m| m.holding_torque(), |m, value| m.set_holding_torque(value))).off("holding torque"),
     row("stepper.rated_current", "I", "A", Required, POSITIVE, "2 A", "Rated current of each phase, with both phases on.")
-        .at(of_drive!(motor, |m| m.stepper.map(|stepper| stepper.rated_current), |m, value| set_rated_current(m, value))),
+        .at(of_drive!(motor, |m| m.stepper.map(|stepper| stepper.rated_current), |m, value| set_rated_current(m, value))).alone(),
     row("stepper.resistance", "R", "ohm", Required, POSITIVE, "1.4 ohm", "Resistance of a phase, with its wires.")
         .at(stepper!(motor resistance)).off("resistance"),
     row("stepper.inductance", "L", "H", Required, POSITIVE, "3 mH", "Inductance of a phase.")
         .at(stepper!(motor inductance)).off("inductance"),
     row("stepper.supply", "V", "V", Required, POSITIVE, "24 V", "Voltage of the driver's supply: largest voltage of a phase, in either direction.")
-        .at(of_drive!(amplifier, |a| a.voltage_limit.filter(|_| !is_amplifier(a)), |a, value| if !is_amplifier(a) { a.voltage_limit = Some(value) })),
+        .at(of_drive!(amplifier, |a| a.voltage_limit.filter(|_| !is_amplifier(a)), |a, value| if !is_amplifier(a) { a.voltage_limit = Some(value) })).alone(),
     row("stepper.microsteps", "", "", Value(1.0), Range::whole(1.0, 1024.0), "16", "Microsteps per full step.")
         .at(stepper!(microsteps)),
     row("stepper.detent_torque", "T_d", "N m", Value(0.0), NOT_NEGATIVE, "15 mN m", "Amplitude of the torque without current, four periods per tooth pitch; below a quarter of the holding torque.")

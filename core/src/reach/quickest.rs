@@ -3,10 +3,11 @@
 
 use super::feasible::{Load, limits, loads, shortfalls};
 use super::resonance::{Drive, reaches, resonances};
-use crate::design::Design;
+use crate::design::{Bounds, Design};
 use crate::error::{Error, Result};
 use crate::golden;
 use crate::machine::{BeltModel, Machine};
+use crate::parameter;
 use crate::signal::arc::Arc;
 use crate::signal::profile::{Leg, Limits, Passage, Profile};
 
@@ -28,6 +29,13 @@ const CORRECTIONS: usize = 6;
 
 /// Relative difference up to which two frequencies are one mode.
 const SAME: f64 = 1e-6;
+
+/// Accelerations between which the largest within the pull-out torque is searched for, m/s², and halvings of their ratio.
+const ACCELERATIONS: [f64; 2] = [1e-3, 1e4];
+const HALVINGS: usize = 24;
+
+/// Way of a coordinate without limits of its travel over which the motor turns slowly, m.
+const SHORT_WAY: f64 = 1e-4;
 
 /// Smallest cruising speed tried, as a fraction of the largest for the path.
 const SLOWEST: f64 = 0.02;
@@ -59,6 +67,36 @@ impl Wanted {
             false => Err(Error::new(format!("a reserve of {}", self.reserve)).allowed("from 0 to 0.9")),
         }
     }
+}
+
+/// Largest acceleration, m/s², of a coordinate alone that steppers move to the end of its travel and back, accelerating
+/// over one half and braking over the other, within the pull-out torque at each speed less the usual reserve of a plan;
+/// at low speeds if its travel is not limited. Zero if there is none, `None` for other motors.
+pub fn within_pull_out(machine: &Machine, slide: usize) -> Option<f64> {
+    machine.stepper()?;
+    let allowed = 1.0 - parameter::default_of("move.plan.reserve")?;
+    let travels: Vec<[f64; 2]> =
+        machine.travels().map(|(_, travel)| travel.map_or([0.0, SHORT_WAY], |own| [own.min, own.max])).collect();
+    let start: Vec<f64> = travels.iter().map(|[min, _]| *min).collect();
+    let mut there = start.clone();
+    there[slide] = travels[slide][1];
+    let way = there[slide] - start[slide];
+    let is_within = |acceleration: f64| {
+        let limits = Limits { speed: (acceleration * way).sqrt(), acceleration, jerk: None, snap: None };
+        let legs = [Leg::To(there.clone(), limits), Leg::To(start.clone(), limits)];
+        let Ok(profiles) = Profile::of_legs(&start, &legs) else { return false };
+        let loads = loads(machine, Bounds::default(), &profiles, INSTANTS);
+        loads.iter().filter(|load| load.limit == "pull_out").all(|load| load.share() <= allowed)
+    };
+    let [mut low, mut high] = ACCELERATIONS;
+    if !is_within(low) {
+        return Some(0.0);
+    }
+    for _ in 0..HALVINGS {
+        let middle = (low * high).sqrt();
+        *if is_within(middle) { &mut low } else { &mut high } = middle;
+    }
+    Some(low)
 }
 
 /// Lowest frequencies along the travel of the modes with held drive pulleys, Hz, in ascending order; for a gantry,

@@ -327,7 +327,7 @@ impl Model {
                 next += 1;
             };
             for (slide, (prefix, name)) in self.of_slides().enumerate() {
-                let words = format!("The {name} from its reference.");
+                let words = format!("Reference minus position of the {name}.");
                 add(format!("{prefix}error"), words, ("m", "mm"), Role::Error(slide));
             }
             for (drive, unit) in self.machine.drives.iter().enumerate() {

@@ -55,7 +55,7 @@ pub enum Role {
     Parameter(usize, bool),
     /// A column of a run.
     Output(usize),
-    /// A slide from its reference, by its number.
+    /// Reference minus position of a slide, by its number.
     Error(usize),
     /// The command for a drive, by its number.
     Command(usize),

@@ -521,6 +521,12 @@ pub(crate) const NEAREST_ALL: f64 = 0.99;
 /// Unit: Jacobians. Source: chosen.
 pub(crate) const NEAREST_ITERATIONS: usize = 40;
 
+/// The same for the single try after a search by differences whose residuals are far above the noise: what the model
+/// does not explain is no reason to choose among its values.
+///
+/// Unit: Jacobians. Source: chosen: bounds the time. Test: `a_reversed_encoder_of_a_stepper_is_named_within_its_budget`.
+pub(crate) const NEAREST_FAR: usize = 6;
+
 /// Stribeck velocities that are tried, relative to the greatest speed of the body.
 ///
 /// Unit: 1. Source: steps of 3. Test: `a_law_that_was_not_asked_for_widens_intervals_and_is_named`.
@@ -705,6 +711,11 @@ pub(crate) const FACTOR_LEAVES: f64 = 0.1;
 ///
 /// Unit: Jacobians. Source: chosen: a right factor shows within a few steps. Test: `a_factor_on_a_column_is_named`.
 pub(crate) const FACTOR_STEPS: usize = 4;
+
+/// Factors that take these steps where derivatives are differences, the best of all by a simulation of each.
+///
+/// Unit: factors. Source: chosen: bounds the time. Test: `a_factor_on_the_output_of_a_stepper_is_named_within_its_budget`.
+pub(crate) const FACTORS_SIMULATED: usize = 4;
 
 /// Factors that are fitted whole, the best of those that were ranked.
 ///

@@ -32,6 +32,13 @@ pub fn verdict(found: &Drift) -> String {
     let names: Vec<&str> = found.best().map(|change| change.estimate.name.as_str()).collect();
     let Some(best) = found.changes.first() else { return "nothing could be changed".into() };
     let explained = 100.0 * (1.0 - best.left).max(0.0);
+    if !found.is_changed() {
+        let name = &best.estimate.name;
+        return format!(
+            "nothing changed beyond what these logs can tell: no single change explains more than noise does; that of \
+             {name} explains most, {explained:.1} % of the sum of squares"
+        );
+    }
     match &names[..] {
         [] => "nothing could be changed".into(),
         [one] => format!("a change of {one} explains most: {explained:.1} % of the sum of squares"),

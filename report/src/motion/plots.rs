@@ -12,7 +12,7 @@ pub struct Curves {
     /// Columns, and what makes a value along the belt of theirs.
     columns: Vec<(String, f64)>,
     thinned: Vec<Decimator>,
-    /// Drives along the belt minus their references: each drive's column of its angle, and weights of the references.
+    /// References along the belt minus their drives: each drive's column of its angle, and weights of the references.
     drives: Vec<(String, Vec<(String, f64)>)>,
     following: Vec<Decimator>,
     /// The path that was asked for and that of the cart, of a gantry.
@@ -76,9 +76,9 @@ impl Curves {
         }
         for ((angle, references), thinned) in self.drives.iter().zip(&mut self.following) {
             self.scratch.clear();
-            self.scratch.extend(column(angle).iter().map(|angle| self.radius * angle));
+            self.scratch.extend(column(angle).iter().map(|angle| -self.radius * angle));
             for (name, share) in references {
-                self.scratch.iter_mut().zip(column(name)).for_each(|(left, y)| *left -= share * y);
+                self.scratch.iter_mut().zip(column(name)).for_each(|(left, y)| *left += share * y);
             }
             thinned.push(time, &self.scratch);
         }
@@ -137,7 +137,7 @@ pub fn figures(machine: &Machine, done: &Done) -> Vec<Named> {
             ];
             (
                 position,
-                vec![line("cart_error", "cart x − y"), ("drive pulley r φ₁ − y".into(), curves.following[0].points())],
+                vec![line("cart_error", "cart y − x"), ("drive pulley y − r φ₁".into(), curves.following[0].points())],
             )
         }
         true => {

@@ -250,7 +250,7 @@ fn step_response(frequency: &[f64], way: &[Complex<f64>], every: f64, until: f64
 /// The cart's error in a move, before and after, and the command.
 fn moved(work: &Work, motion: &Move) -> Result<Figure> {
     let stage = &work.case.machine;
-    let mut error = Panel::new(Axis::new("x − y", "m").shown_as("µm", 1e6)).weight(1.6);
+    let mut error = Panel::new(Axis::new("y − x", "m").shown_as("µm", 1e6)).weight(1.6);
     let mut command = Panel::new(Axis::new("Voltage", "V"));
     for (name, verdict, colour) in
         [("before", &work.tuned.before, Colour::Amber), ("after", &work.tuned.after, Colour::Blue)]

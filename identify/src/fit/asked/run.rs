@@ -6,8 +6,9 @@ use crate::control::{Added, follow};
 use crate::design::Design;
 use crate::fit::limits::{DITHER_STEPS, EVEN_RASTER, INPUT_BEFORE_WINDOW, RASTER_POINTS};
 use crate::log::{Log, Quantity};
-use crate::machine::{AmplifierMode, Machine};
+use crate::machine::{AmplifierMode, DriveUnit, Machine};
 use crate::mechanism::State;
+use crate::reach::pull_out;
 use crate::signal::Signal;
 use crate::signal::profile::Profile;
 use crate::solve::{Bench, Detail, Ending, Flow, Solver};
@@ -444,6 +445,28 @@ impl FittedLog {
         input
     }
 
+    /// Largest speed of a stepper's command, and the largest at which the stepper counts as having torque, m/s, if most of
+    /// the commanded path is faster than that; none for other motors.
+    ///
+    /// A rotor is out of step there whatever its load, and a simulation resolves each turn of the field: a command in
+    /// the wrong unit takes minutes.
+    pub(crate) fn outrun(&self, machine: &Machine) -> Option<[f64; 2]> {
+        let beyond = |(unit, input): (&DriveUnit, &Signal)| {
+            let most = pull_out::fastest(unit)? * machine.pulley_radius / unit.amplifier.gain.abs();
+            let (mut path, mut outrun, mut peak) = (0.0, 0.0, 0.0f64);
+            for step in self.time.windows(2) {
+                // Jumps from one held value to the next have no speed.
+                let speed = input.piece(step[0]).coefficients[1].abs();
+                let length = speed * (step[1] - step[0]);
+                path += length;
+                outrun += if speed > most { length } else { 0.0 };
+                peak = peak.max(speed);
+            }
+            (outrun > 0.5 * path).then_some([peak, most])
+        };
+        machine.drives.iter().zip(&self.inputs).find_map(beyond)
+    }
+
     /// The model's outputs at the log's times, one column for each, before what sensors make of them; false where it
     /// does not reach the end.
     pub fn predict(
@@ -454,6 +477,9 @@ impl FittedLog {
         quantities: &[Quantity],
         out: &mut [Vec<f64>],
     ) -> bool {
+        if self.outrun(machine).is_some() {
+            return false;
+        }
         let mut machine = machine.clone();
         let experiment = self.experiment(&mut machine, extras);
         let mut slopes: Vec<Vec<f64>> = vec![Vec::new(); quantities.len()];

@@ -8,7 +8,7 @@
 use crate::case::{Case, Nuisances, Plan, Scope};
 use crate::error::Result;
 use crate::fit::asked::problem::Stop;
-use crate::fit::limits::CHANGE_ALIKE;
+use crate::fit::limits::{CAUSE_ERRORS, CAUSE_EXPLAINS, CHANGE_ALIKE};
 use crate::fit::search::starts::{Searched, Work};
 use crate::fit::trust::found::Estimate;
 use crate::fit::trust::held_out::nothing;
@@ -48,7 +48,22 @@ pub struct Change {
     pub left: f64,
 }
 
+impl Change {
+    /// True if the logs show this change: it explains as much of the sum of squares as a missing element has to, and is
+    /// as many times its standard error.
+    pub fn is_shown(&self) -> bool {
+        let Estimate { value, start, error, .. } = self.estimate;
+        let is_far = error.is_none_or(|error| (value - start).abs() >= CAUSE_ERRORS * error);
+        is_far && 1.0 - self.left >= CAUSE_EXPLAINS
+    }
+}
+
 impl Drift {
+    /// True if the logs show any change.
+    pub fn is_changed(&self) -> bool {
+        self.changes.iter().any(Change::is_shown)
+    }
+
     /// Quantities in the logs.
     pub fn quantities(&self) -> Vec<Quantity> {
         self.unchanged.iter().filter(|one| !one.held_out).map(|one| one.quantity).collect()

@@ -16,6 +16,7 @@ use crate::fit::limits::{
     WEIGHT_ROUNDS,
 };
 use crate::log::Quantity;
+use crate::number::engineering;
 use crate::reach::resonance::{Drive, resonances};
 use crate::solve::Flow;
 use nalgebra::{DMatrix, DVector};
@@ -117,6 +118,15 @@ pub(crate) fn search_as_far<'a>(
     };
     let mut best = descend(&mut problem, &start, &whole);
     if best.ending == Ending::Failed {
+        let outrun = |run: &FittedLog| Some((run.name.clone(), run.outrun(&problem.machine)?));
+        if let Some((name, [speed, most])) = problem.runs.iter().find_map(outrun) {
+            let [speed, most] = [speed, most].map(|speed| engineering(speed, "m/s", 3));
+            return Err(Error::new(format!(
+                "the command of the log \"{name}\" reaches {speed}, and this stepper has no torque at most of its speeds"
+            ))
+            .allowed(format!("up to {most}"))
+            .next("check the unit and the scale of its input in `log`"));
+        }
         return Err(Error::new("the model cannot be run through these logs with the values of the case file")
             .next("run `taut simulate` on the case to see why, or start from other values"));
     }

@@ -20,7 +20,9 @@ use crate::case::{Case, Plan};
 use crate::error::Result;
 use crate::fit::asked::problem::{Problem, Stop};
 use crate::fit::asked::residuals::{Bounds, Differences, Residuals};
-use crate::fit::limits::{COST_GROWTH, HUBER, NEAREST_ALL, NEAREST_ITERATIONS, NEAREST_ROUNDS, NEAREST_SETTLED};
+use crate::fit::limits::{
+    COST_GROWTH, FAR_BEYOND_NOISE, HUBER, NEAREST_ALL, NEAREST_FAR, NEAREST_ITERATIONS, NEAREST_ROUNDS, NEAREST_SETTLED,
+};
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options, cost_of};
 use crate::fit::search::starts::{Effort, Searched, Work, search_as_far};
@@ -102,13 +104,16 @@ pub(crate) fn search_near<'a>(
     let whole = Options::default();
     let mut searched =
         search_as_far(case, plan, stop, &Effort { options: whole, is_straight: false, is_short: false }, watch)?;
+    let is_far = searched.problem.differences > 0 && searched.times_noise().any(|(_, times)| times > FAR_BEYOND_NOISE);
     let Searched { problem, best, work, .. } = &mut searched;
     let huber = if plan.huber { HUBER } else { f64::INFINITY };
-    let options = Options { huber, rounding: problem.rounding(), ..whole };
+    let pull = if is_far { Pull::FAR } else { Pull::WHOLE };
+    let iterations = pull.iterations;
+    let options = Options { huber, rounding: problem.rounding(), iterations, evolutions: 0, ..whole };
     let mut seen = None;
     if best.ending != Ending::Interrupted {
         let given = problem.point_of(given);
-        seen = nearest(problem, best, &given, &options, watch, work);
+        seen = nearest(problem, best, &given, (&options, pull), watch, work);
     }
     let set = problem.as_set(&best.x);
     if set != best.x {
@@ -116,6 +121,22 @@ pub(crate) fn search_near<'a>(
     }
     work.simulations = problem.simulations;
     Ok(Settled { searched, seen })
+}
+
+/// The effort of moving towards the values of the case.
+#[derive(Debug, Clone, Copy)]
+struct Pull {
+    rounds: usize,
+    /// Number of starts of a round.
+    tries: usize,
+    /// Jacobians of each.
+    iterations: usize,
+}
+
+impl Pull {
+    const WHOLE: Self = Self { rounds: NEAREST_ROUNDS, tries: usize::MAX, iterations: NEAREST_ITERATIONS };
+    /// After a search by differences whose residuals are far above the noise.
+    const FAR: Self = Self { rounds: 1, tries: 1, iterations: NEAREST_FAR };
 }
 
 /// A problem whose variables are pulled towards their start along some directions.
@@ -187,13 +208,12 @@ fn nearest(
     problem: &mut Problem,
     best: &mut Minimum,
     given: &[f64],
-    options: &Options,
+    (options, pull): (&Options, Pull),
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
     work: &mut Work,
 ) -> Option<Judged> {
-    let options = Options { iterations: NEAREST_ITERATIONS, evolutions: 0, ..*options };
     let most = best.cost * (1.0 + NEAREST_ROUNDS as f64 * COST_GROWTH) + f64::MIN_POSITIVE;
-    for _ in 0..NEAREST_ROUNDS {
+    for _ in 0..pull.rounds {
         let none = vec![false; best.x.len()];
         let judged = Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &none)?;
         let lost = judged.identifiability.lost.clone();
@@ -202,7 +222,9 @@ fn nearest(
         }
         let machine = problem.stage_at(&best.x);
         let whole: Vec<f64> = (0..lost.nrows()).map(|j| problem.whole(&machine, j, best.x[j])).collect();
-        let Some(found) = round(problem, best, (given, &whole), &lost, (&options, most), watch, work) else { break };
+        let Some(found) = round(problem, best, (given, &whole), &lost, (options, most, pull.tries), watch, work) else {
+            break;
+        };
         let moved = (0..lost.nrows()).map(|j| ((found.x[j] - best.x[j]) / whole[j]).abs()).fold(0.0, f64::max);
         *best = found;
         if moved < NEAREST_SETTLED {
@@ -218,7 +240,7 @@ fn round(
     best: &Minimum,
     (given, whole): (&[f64], &[f64]),
     lost: &DMatrix<f64>,
-    (options, most): (&Options, f64),
+    (options, most, tried): (&Options, f64, usize),
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
     work: &mut Work,
 ) -> Option<Minimum> {
@@ -251,7 +273,7 @@ fn round(
     if hidden.is_empty() {
         tries.remove(0);
     }
-    for (from, bounds) in tries {
+    for (from, bounds) in tries.into_iter().take(tried) {
         let mut anchored = Anchored { problem: &mut *problem, rows: rows.clone(), at: at.clone() };
         let found = minimise(&mut anchored, &from, bounds, options, &mut *watch);
         work.iterations += found.iterations;

@@ -7,12 +7,13 @@
 use super::scores::beside_log;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
+use crate::fit::asked::residuals::Residuals;
 use crate::fit::limits::{
     FACTOR_LEAVES, HUBER, JUMP, MENDED, NO_WORSE, OPPOSITE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS,
     UNIT_WORSE,
 };
 use crate::fit::search::least_squares::minimise;
-use crate::fit::search::point::{Ending, Minimum, Options};
+use crate::fit::search::point::{Ending, Minimum, Options, cost_of};
 use crate::fit::search::regression::suspected_shift;
 use crate::fit::search::starts::Searched;
 use crate::log::{Log, Note, Quantity, Remedy, Severity, Survey, jumps_text};
@@ -186,8 +187,9 @@ fn squares(problem: &Problem, residuals: &[f64]) -> Vec<(Quantity, f64)> {
     problem.quantities().into_iter().map(of).collect()
 }
 
-/// Agreement with the logs after correction of those with these names, after a limited number of Jacobians; `None` if
-/// no model can simulate them.
+/// Agreement with the logs after correction of those with these names, after a limited number of Jacobians, none of
+/// which at zero; `None` if no model can simulate them. Where derivatives are differences, only the better of both starts
+/// is searched from.
 pub(crate) fn mended(
     case: &Case,
     plan: &Plan,
@@ -213,8 +215,17 @@ pub(crate) fn mended(
     }
     let before = found.best.cost / found.problem.counted().max(1) as f64;
     let starts = [problem.start(), found.best.x.clone()];
-    let ends: Vec<_> = starts.iter().filter_map(|start| descend(&mut problem, plan, start, iterations)).collect();
-    let (end, cost) = ends.into_iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
+    let end = if found.problem.differences > 0 {
+        let simulated =
+            starts.into_iter().filter_map(|start| simulated(&mut problem, plan, start)).reduce(End::better)?;
+        match iterations {
+            0 => simulated,
+            _ => descend(&mut problem, plan, &simulated.x, iterations)?,
+        }
+    } else {
+        let ends = starts.iter().filter_map(|start| descend(&mut problem, plan, start, iterations));
+        ends.reduce(End::better)?
+    };
     let counted = problem.counted();
     let own = squares(&found.problem, &found.best.residuals);
     let part = |(quantity, square): (Quantity, f64)| {
@@ -227,25 +238,52 @@ pub(crate) fn mended(
         .map(|(j, parameter)| (problem.value(j, end.x[j]) / parameter.start).max(0.0))
         .map(|ratio| ratio.max(1.0 / ratio))
         .fold(1.0, f64::max);
-    Some(Mended { left: cost / counted.max(1) as f64 / before.max(f64::MIN_POSITIVE), parts, counted, moved })
+    Some(Mended { left: end.cost / counted.max(1) as f64 / before.max(f64::MIN_POSITIVE), parts, counted, moved })
 }
 
-/// Result of a short search from `start`, and its cost.
-fn descend(problem: &mut Problem, plan: &Plan, start: &[f64], iterations: usize) -> Option<(Minimum, f64)> {
+/// End of a short search.
+struct End {
+    x: Vec<f64>,
+    residuals: Vec<f64>,
+    cost: f64,
+}
+
+impl End {
+    /// The one with the lower cost; of equals the first.
+    fn better(self, other: Self) -> Self {
+        if other.cost < self.cost { other } else { self }
+    }
+}
+
+/// Threshold of the loss of this plan.
+fn huber(plan: &Plan) -> f64 {
+    if plan.huber { HUBER } else { f64::INFINITY }
+}
+
+/// A point without a search; `None` if the model cannot simulate the logs there.
+fn simulated(problem: &mut Problem, plan: &Plan, x: Vec<f64>) -> Option<End> {
+    let mut residuals = vec![0.0; problem.rows()];
+    let good = x.len() == problem.variables() && problem.evaluate(&x, &mut residuals);
+    let cost = cost_of(&residuals, huber(plan));
+    (good && cost.is_finite()).then_some(End { x, residuals, cost })
+}
+
+/// Result of a short search from `start`.
+fn descend(problem: &mut Problem, plan: &Plan, start: &[f64], iterations: usize) -> Option<End> {
     if start.len() != problem.variables() || problem.is_stopped() {
         return None;
     }
-    let huber = if plan.huber { HUBER } else { f64::INFINITY };
     let options = Options {
         iterations,
         tolerance: ROUGH_TOLERANCE,
-        huber,
+        huber: huber(plan),
         evolutions: 0,
         rounding: problem.rounding(),
         ..Options::default()
     };
     let bounds = problem.bounds();
-    let found = minimise(problem, start, &bounds, &options, &mut |_, _| Flow::Continue);
-    let cost = found.cost;
-    (!matches!(found.ending, Ending::Failed | Ending::Interrupted) && cost.is_finite()).then_some((found, cost))
+    let Minimum { x, residuals, cost, ending, .. } =
+        minimise(problem, start, &bounds, &options, &mut |_, _| Flow::Continue);
+    let is_good = !matches!(ending, Ending::Failed | Ending::Interrupted) && cost.is_finite();
+    is_good.then_some(End { x, residuals, cost })
 }

@@ -6,8 +6,8 @@ use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::limits::{
-    FACTOR_ALIKE, FACTOR_LEAVES, FACTOR_MOVES, FACTOR_STEPS, FACTORS, FACTORS_FITTED, REFIT_TOLERANCE,
-    TRIAL_FIT_ITERATIONS, UNEXPLAINED_WINDOWS, WINDOW_SAMPLES, WINDOWS_EXPLAIN, WINDOWS_MOST,
+    FACTOR_ALIKE, FACTOR_LEAVES, FACTOR_MOVES, FACTOR_STEPS, FACTORS, FACTORS_FITTED, FACTORS_SIMULATED,
+    REFIT_TOLERANCE, TRIAL_FIT_ITERATIONS, UNEXPLAINED_WINDOWS, WINDOW_SAMPLES, WINDOWS_EXPLAIN, WINDOWS_MOST,
 };
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Options};
@@ -203,11 +203,23 @@ fn factor(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names:
         let mended = mended(case, plan, found, names, &remedy, steps)?;
         Some(Factor { column, factor, remedy, mended })
     };
-    let mut ranked: Vec<Factor> = outputs.chain(inputs).filter_map(|own| tried(own, FACTOR_STEPS)).collect();
-    ranked.sort_by(Factor::order);
-    ranked.truncate(FACTORS_FITTED);
-    let again = |own: Factor| tried((own.column, own.factor, own.remedy), TRIAL_FIT_ITERATIONS);
-    let Factor { column, factor, mended, .. } = ranked.into_iter().filter_map(again).min_by(Factor::order)?;
+    let again = |own: Factor, steps| tried((own.column, own.factor, own.remedy), steps);
+    let best = |mut all: Vec<Factor>, most| {
+        all.sort_by(Factor::order);
+        all.truncate(most);
+        all
+    };
+    let all = outputs.chain(inputs);
+    let ranked: Vec<Factor> = match found.problem.differences > 0 {
+        false => all.filter_map(|own| tried(own, FACTOR_STEPS)).collect(),
+        // Derivatives by differences take long: simulations choose the factors that take steps.
+        true => {
+            let simulated = best(all.filter_map(|own| tried(own, 0)).collect(), FACTORS_SIMULATED);
+            simulated.into_iter().filter_map(|own| again(own, FACTOR_STEPS)).collect()
+        }
+    };
+    let fitted = best(ranked, FACTORS_FITTED).into_iter().filter_map(|own| again(own, TRIAL_FIT_ITERATIONS));
+    let Factor { column, factor, mended, .. } = fitted.min_by(Factor::order)?;
     if mended.left > FACTOR_LEAVES {
         return None;
     }
