@@ -50,7 +50,8 @@ pub(super) fn scales(site: &Site) -> Vec<Extended> {
 pub(super) fn scale_words(_: &Site, extended: &Extended, found: &Fitted) -> Said {
     let name = extended.plan.nuisance.sensor_scale.map_or("", Quantity::name);
     let factor = 1.0 + found.value;
-    let words = format!("a sensor of {name} that reads {} times its motion", significant(factor, 4));
+    let words =
+        format!("a sensor of {name} that reads {} times its motion, relative to the others", significant(factor, 4));
     let scale = significant(1.0 / factor, 4);
     Said { words, add: format!("check its counts and its radius, or set scale = {{ {name} = {scale} }} in the log") }
 }
