@@ -439,7 +439,7 @@ pub(crate) const FAR_BEYOND_NOISE: f64 = 20.0;
 /// Residuals beyond this multiple of the noise leave undecided which belt of a gantry is looser.
 ///
 /// Unit: 1. Source: chosen: right models leave less, motors with wrong constants or a wrong delay 14 times and more.
-/// Test: `belts_of_a_doubtful_fit_are_undecided`.
+/// Test: `belts_are_compared_with_the_element_that_explains_the_residuals`.
 pub(crate) const BELTS_DOUBTFUL: f64 = 5.0;
 
 /// Costs that differ by less are taken for those of one minimum.
