@@ -34,8 +34,8 @@ pub(super) struct Tried<'a> {
 
 impl<'a> Tried<'a> {
     /// The result of the first steps from the end of the fit without the element, or from a search in windows that begins
-    /// with the values of the case; `None` if the model cannot simulate the logs. Steps of curved friction, which take long, are not taken where the linear model at the start shows
-    /// that they will not fall below `goal`.
+    /// with the values of the case; `None` if the model cannot simulate the logs. Steps of curved friction, which take
+    /// long, are not taken where the linear model at the start shows that they will not fall below `goal`.
     pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, goal: f64) -> Option<Self> {
         let mut begun = Self::from(site, row, extended, (&site.found.problem, &site.found.best.x))?;
         if site.is_anew {
