@@ -25,8 +25,6 @@ pub(crate) struct Damped {
     is_likely: bool,
     /// Number of successive steps with an insignificant gain.
     slow: usize,
-    /// Number of its Jacobians: those of a bundle in between have a limit of their own.
-    taken: usize,
     trial: Vec<f64>,
 }
 
@@ -34,7 +32,7 @@ impl Damped {
     /// Begins with cheap derivatives, if requested, or with those that are known at the start.
     pub fn new(options: &Options, known: Option<DMatrix<f64>>) -> Self {
         let how = if options.frugal { Differences::Forward } else { Differences::Central };
-        Self { how, lambda: None, growth: 2.0, ahead: known, is_likely: true, slow: 0, taken: 0, trial: Vec::new() }
+        Self { how, lambda: None, growth: 2.0, ahead: known, is_likely: true, slow: 0, trial: Vec::new() }
     }
 
     /// Descends from `at`, beginning with the last kind of derivatives.
@@ -48,7 +46,6 @@ impl Damped {
             if !at.linearise(problem, &how, self.ahead.take()) {
                 break Climb::Ended(Ending::Stalled);
             }
-            self.taken += 1;
             let is_sharp = how == Differences::Central || at.is_exact || !at.options.sharp;
             if at.is_at_minimum() {
                 if is_sharp {
@@ -60,7 +57,7 @@ impl Damped {
             if at.options.sharp {
                 sharpen(&mut how, at);
             }
-            if self.taken >= at.options.iterations {
+            if at.best.iterations >= at.options.iterations {
                 break Climb::Ended(Ending::OutOfIterations);
             }
             if self.step(at, problem, &how) {

@@ -249,20 +249,6 @@ mod tests {
         assert!(valley.0.len() > 3 && valley.0[0] == Differences::Forward, "{:?}", valley.0);
     }
 
-    /// The Jacobians of a bundle used up those of the damped steps after it: the fit of an H-frame with the right
-    /// parameters ended at the limit of iterations.
-    #[test]
-    fn damped_steps_have_their_own_limit_of_jacobians() {
-        let (bounds, options) = (Bounds::none(2), Options::default());
-        let mut valley = Differenced;
-        let mut at = Point::new(&mut valley, &START, &bounds, &options).unwrap();
-        at.best.iterations = options.iterations;
-        let before = at.best.cost;
-        let end = Damped::new(&options, None).climb(&mut at, &mut valley, &mut |_, _| Flow::Continue);
-        assert_ne!(end, Climb::Ended(Ending::OutOfIterations));
-        assert!(at.best.cost < before && at.best.iterations > options.iterations);
-    }
-
     /// A rung with a given end that records its use.
     struct RecordingRung {
         ends: Vec<Climb>,

@@ -10,7 +10,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct Options {
     /// Largest predicted gain of the last step, in standard errors.
     pub tolerance: f64,
-    /// Maximum number of Jacobians of damped steps, and of a bundle beside them.
+    /// Maximum number of Jacobians.
     pub iterations: usize,
     /// Beyond this many units a residual counts linearly (Huber 1964); infinite for squares.
     pub huber: f64,
