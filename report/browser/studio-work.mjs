@@ -286,7 +286,7 @@ await test("gains are dragged, and error, margins and Nyquist's curve follow", a
     before = await margins();
   const canvas = name =>
     page.evaluate(name => document.querySelector(`[data-picture="${name}"] canvas`).toDataURL(), name);
-  const curves = await Promise.all([canvas("Nyquist's curve"), canvas("Cart minus reference")]);
+  const curves = await Promise.all([canvas("Nyquist's curve"), canvas("Reference minus cart")]);
   const slider = page.locator(".gains .row[data-key='controller.pid.proportional'] input[type=range]");
   await slider.scrollIntoViewIfNeeded();
   const box = await slider.boundingBox();
@@ -296,7 +296,7 @@ await test("gains are dragged, and error, margins and Nyquist's curve follow", a
   await page.mouse.up();
   await quiet(page);
   expect((await margins()) !== before, "the margins stay");
-  const now = await Promise.all([canvas("Nyquist's curve"), canvas("Cart minus reference")]);
+  const now = await Promise.all([canvas("Nyquist's curve"), canvas("Reference minus cart")]);
   expect(now[0] !== curves[0] && now[1] !== curves[1], "the curves stay");
   await page.locator("#move").selectOption("1");
   await quiet(page);
