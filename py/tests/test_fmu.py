@@ -237,8 +237,8 @@ def test_a_controller_inside_follows_as_taut_move_does(root: Path, tmp_path: Pat
         output=["cart_position", "error", "command"],
     )
     assert abs(result["error"][-1]) < 2e-4, "it gets there, as far as friction lets it"
-    assert result["error"][0] == -0.01
-    off = result["cart_position"] - 0.01 - result["error"]
+    assert result["error"][0] == 0.01
+    off = 0.01 - result["cart_position"] - result["error"]
     assert np.max(np.abs(off)) < 1e-15
     exchanged = simulate_fmu(
         unit,
