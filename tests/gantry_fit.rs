@@ -257,8 +257,8 @@ fn simulated(kind: MachineKind, changes: &[String]) -> Case {
     case(kind, &changes.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-/// A wrong torque constant of one drive was never named; masses, friction and belts are drawn, and so are the drive, the
-/// number and its factor.
+/// A wrong torque constant of one drive was never named; masses, friction and belts are drawn, and so are the drive,
+/// the number and its factor.
 #[test]
 fn a_wrong_number_of_one_drive_is_named() {
     let mut chance = Chance::new(4711);

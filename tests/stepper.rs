@@ -820,8 +820,8 @@ fn plainly(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Fits the log of [`logged`] read with this `scale` from values near the truth; the number of simulations, those of the
-/// trials after the search included.
+/// Fits the log of [`logged`] read with this `scale` from values near the truth; the number of simulations, those of
+/// the trials after the search included.
 fn fitted_with(name: &str, scale: &str) -> (taut::Result<Fit>, usize) {
     let folder = std::env::temp_dir().join(format!("taut-stepper-{name}-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();

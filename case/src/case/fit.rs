@@ -159,8 +159,8 @@ pub struct Nuisances {
     pub bias: bool,
     /// The position whose sensor has play: its reading follows the motion only when the play is used up.
     pub sensor_play: Option<Quantity>,
-    /// The quantity whose readings have a factor: no key of the case, whose logs have `scale`, but an element that a fit
-    /// tries.
+    /// The quantity whose readings have a factor: no key of the case, whose logs have `scale`, but an element that a
+    /// fit tries.
     pub sensor_scale: Option<Quantity>,
 }
 

@@ -35,8 +35,8 @@ pub enum Source {
         drive: Drive,
         /// Modes at all positions.
         modes: Vec<Resonance>,
-        /// Largest acceleration that steppers give, m/s²: [`within_pull_out`], rounded down to 0.1 m/s²; `None` for other
-        /// motors.
+        /// Largest acceleration that steppers give, m/s²: [`within_pull_out`], rounded down to 0.1 m/s²; `None` for
+        /// other motors.
         acceleration: Option<f64>,
     },
 }

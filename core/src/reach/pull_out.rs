@@ -28,8 +28,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 const STEPS: f64 = 240.0;
 const FINE: f64 = 0.5;
 
-/// Initial grid of angles in the search for the largest torque up to the largest angle, rad, and golden sections between
-/// them.
+/// Initial grid of angles in the search for the largest torque up to the largest angle, rad, and golden sections
+/// between them.
 ///
 /// With R ≪ N ω L the current lags behind the voltage by a quarter of a period, so that the torque is largest near δ =
 /// π; the voltage of a regulator at its limit lags behind the field by up to another quarter.
@@ -174,7 +174,8 @@ impl PullOut {
     }
 }
 
-/// What the supply of a chopper lacks for the rated current at rest, in a sentence with what to do; none if it suffices.
+/// What the supply of a chopper lacks for the rated current at rest, in a sentence with what to do; none if it
+/// suffices.
 ///
 /// Phases at the commanded current √2 I need √2 R I. Full steps command ±I in both phases, which need R I.
 pub fn short_supply(machine: &Machine) -> Option<String> {
@@ -202,8 +203,8 @@ pub fn fastest(unit: &DriveUnit) -> Option<f64> {
     Phases::of_motor(&unit.motor, &unit.amplifier).map(|phases| FASTEST * corner(&phases))
 }
 
-/// Speed of the rotor, rad/s, up to which the regulator has voltage to spare. A driver that sets the voltage has no such
-/// speed; the speed at which resistance equals reactance is used instead.
+/// Speed of the rotor, rad/s, up to which the regulator has voltage to spare. A driver that sets the voltage has no
+/// such speed; the speed at which resistance equals reactance is used instead.
 fn corner(phases: &Phases) -> f64 {
     if phases.regulator.is_none() {
         return phases.resistance / phases.inductance / phases.teeth;

@@ -30,7 +30,8 @@ const CORRECTIONS: usize = 6;
 /// Relative difference up to which two frequencies are one mode.
 const SAME: f64 = 1e-6;
 
-/// Accelerations between which the largest within the pull-out torque is searched for, m/s², and halvings of their ratio.
+/// Accelerations between which the largest within the pull-out torque is searched for, m/s², and halvings of their
+/// ratio.
 const ACCELERATIONS: [f64; 2] = [1e-3, 1e4];
 const HALVINGS: usize = 24;
 

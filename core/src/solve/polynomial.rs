@@ -228,7 +228,8 @@ fn range_of<const T: usize>(b: &[f64; T]) -> (f64, f64) {
     b.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &b| (low.min(b), high.max(b)))
 }
 
-/// The end of 0..1 at which Bernstein's form has this one of its extreme coefficients, if any: the extreme value itself.
+/// The end of 0..1 at which Bernstein's form has this one of its extreme coefficients, if any: the extreme value
+/// itself.
 #[inline]
 fn end_with<const T: usize>(b: &[f64; T], extreme: f64) -> Option<f64> {
     if b[0] == extreme {

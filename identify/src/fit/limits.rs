@@ -524,7 +524,8 @@ pub(crate) const NEAREST_ITERATIONS: usize = 40;
 /// The same for the single try after a search by differences whose residuals are far above the noise: what the model
 /// does not explain is no reason to choose among its values.
 ///
-/// Unit: Jacobians. Source: chosen: bounds the time. Test: `a_reversed_encoder_of_a_stepper_is_named_within_its_budget`.
+/// Unit: Jacobians. Source: chosen: bounds the time. Test:
+/// `a_reversed_encoder_of_a_stepper_is_named_within_its_budget`.
 pub(crate) const NEAREST_FAR: usize = 6;
 
 /// Stribeck velocities that are tried, relative to the greatest speed of the body.
@@ -714,7 +715,8 @@ pub(crate) const FACTOR_STEPS: usize = 4;
 
 /// Factors that take these steps where derivatives are differences, the best of all by a simulation of each.
 ///
-/// Unit: factors. Source: chosen: bounds the time. Test: `a_factor_on_the_output_of_a_stepper_is_named_within_its_budget`.
+/// Unit: factors. Source: chosen: bounds the time. Test:
+/// `a_factor_on_the_output_of_a_stepper_is_named_within_its_budget`.
 pub(crate) const FACTORS_SIMULATED: usize = 4;
 
 /// Factors that are fitted whole, the best of those that were ranked.

@@ -228,33 +228,19 @@ impl<'a> Problem<'a> {
             }
             for (index, seen) in run.seen.iter().enumerate() {
                 let counted = readings.iter().flatten().any(|reading| reading.takes(index));
-                if !bias
-                    && !counted
-                    && seen.quantity.is_position()
-                    && seen.step > 0.0
-                    && readings.iter().any(Option::is_some)
-                {
-                    // Where the start is that of another sensor, a count begins anywhere within a step of it.
-                    run.extras.push(Extra {
-                        what: Nuisance::Bias(index),
-                        start: 0.0,
-                        unit: seen.step,
-                        low: -seen.step,
-                        high: seen.step,
-                        known: Some(seen.step / 12f64.sqrt()),
-                    });
-                }
-                if bias && !counted {
-                    let wide = extent(&seen.values).max(1e-9);
-                    run.extras.push(Extra {
-                        what: Nuisance::Bias(index),
-                        start: 0.0,
-                        unit: 1e-2 * wide,
-                        low: -wide,
-                        high: wide,
-                        known: None,
-                    });
-                }
+                // Where the start is that of another sensor, a count begins anywhere within a step of it.
+                let is_between_counts =
+                    seen.quantity.is_position() && seen.step > 0.0 && readings.iter().any(Option::is_some);
+                let (unit, wide, known) = match () {
+                    () if counted => continue,
+                    () if bias => {
+                        let wide = extent(&seen.values).max(1e-9);
+                        (1e-2 * wide, wide, None)
+                    }
+                    () if is_between_counts => (seen.step, seen.step, Some(seen.step / 12f64.sqrt())),
+                    () => continue,
+                };
+                run.extras.push(Extra { what: Nuisance::Bias(index), start: 0.0, unit, low: -wide, high: wide, known });
             }
             // Extras with low == high are constants, not variables; see `extras_of`.
         }

@@ -445,8 +445,8 @@ impl FittedLog {
         input
     }
 
-    /// Largest speed of a stepper's command, and the largest at which the stepper counts as having torque, m/s, if most of
-    /// the commanded path is faster than that; none for other motors.
+    /// Largest speed of a stepper's command, and the largest at which the stepper counts as having torque, m/s, if most
+    /// of the commanded path is faster than that; none for other motors.
     ///
     /// A rotor is out of step there whatever its load, and a simulation resolves each turn of the field: a command in
     /// the wrong unit takes minutes.

@@ -70,8 +70,8 @@ pub(crate) struct Effort {
     pub options: Options,
     /// True if friction curves are simulated as piecewise linear.
     pub is_straight: bool,
-    /// True if it begins near its end: machines without a balance of torques need no search for a start, and a search by
-    /// differences whose iterations are used up does not begin again with new weights.
+    /// True if it begins near its end: machines without a balance of torques need no search for a start, and a search
+    /// by differences whose iterations are used up does not begin again with new weights.
     pub is_short: bool,
 }
 
@@ -410,8 +410,8 @@ fn in_windows(
     Ok(best.map(|best| best.x))
 }
 
-/// A start for an element that a machine of several coordinates may lack, from the point `start`: by fits in the shorter
-/// of these windows alone, which are ranked afterwards. `None` if they fail.
+/// A start for an element that a machine of several coordinates may lack, from the point `start`: by fits in the
+/// shorter of these windows alone, which are ranked afterwards. `None` if they fail.
 pub(crate) fn start_in_windows(case: &Case, plan: &Plan, problem: &mut Problem, start: &[f64]) -> Option<Vec<f64>> {
     let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
         let options = Options { rounding: problem.rounding(), ..*options };

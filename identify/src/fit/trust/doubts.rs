@@ -41,8 +41,8 @@ pub struct OtherLaw {
 /// An element that the model lacks and the logs show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
-    /// Its key: `spring`, `play`, `sensor_play`, `sensor_scale`, `drive`, `delay`, `limit`, `inductance`, `drag`, `stribeck`, `lugre`,
-    /// `load`, `apart`, `yaw`.
+    /// Its key: `spring`, `play`, `sensor_play`, `sensor_scale`, `drive`, `delay`, `limit`, `inductance`, `drag`,
+    /// `stribeck`, `lugre`, `load`, `apart`, `yaw`.
     pub key: &'static str,
     /// In words, with its size.
     pub words: String,

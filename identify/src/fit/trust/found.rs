@@ -140,8 +140,8 @@ impl Fit {
 
     /// The comparison of the belts of two drives; `None` for a machine with one drive, or if no free parameter changes
     /// them. Where a missing element explains nearly all of the residuals, it is that of the fit with it, since the fit
-    /// without it may have ended anywhere. Undetermined if the fit is doubtful for another reason than residuals a little
-    /// above the noise, or a missing element, for which intervals are widened.
+    /// without it may have ended anywhere. Undetermined if the fit is doubtful for another reason than residuals a
+    /// little above the noise, or a missing element, for which intervals are widened.
     pub fn belts(&self) -> Option<Belts> {
         let stated = self.identifiability.as_ref()?.belts.as_ref()?.belts.clone();
         if let Some(cause) = self.cause.as_ref().filter(|cause| cause.explained >= CAUSE_SETTLES) {

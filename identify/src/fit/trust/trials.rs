@@ -188,8 +188,8 @@ fn squares(problem: &Problem, residuals: &[f64]) -> Vec<(Quantity, f64)> {
 }
 
 /// Agreement with the logs after correction of those with these names, after a limited number of Jacobians, none of
-/// which at zero; `None` if no model can simulate them. Where derivatives are differences, only the better of both starts
-/// is searched from.
+/// which at zero; `None` if no model can simulate them. Where derivatives are differences, only the better of both
+/// starts is searched from.
 pub(crate) fn mended(
     case: &Case,
     plan: &Plan,

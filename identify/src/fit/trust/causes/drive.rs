@@ -7,9 +7,9 @@
 //! τ = n K_t (g u − n K_e φ̇)/R
 //! ```
 //!
-//! A factor f on both constants multiplies the part of u by f and that of φ̇ by f², a factor f on K_t alone, or 1/f on R,
-//! both parts by f, and a factor f on the gain only the part of u. The logs thus tell these three apart as far as they
-//! tell the parts apart, but never K_t alone from R. In current mode, τ = n K_t g u, they tell none apart.
+//! A factor f on both constants multiplies the part of u by f and that of φ̇ by f², a factor f on K_t alone, or 1/f on
+//! R, both parts by f, and a factor f on the gain only the part of u. The logs thus tell these three apart as far as
+//! they tell the parts apart, but never K_t alone from R. In current mode, τ = n K_t g u, they tell none apart.
 
 use super::extension::{Extended, Fitted, Said, Site, Telling, shown};
 use crate::fit::limits::DRIVE_FACTORS;

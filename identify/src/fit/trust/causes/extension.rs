@@ -19,8 +19,8 @@ pub(super) struct Site<'s, 'a> {
     pub found: &'s Searched<'a>,
     /// The machine with the estimates.
     pub machine: Machine,
-    /// True if the fit of a machine of several coordinates ended elsewhere than within the noise, so that elements begin
-    /// with the values of the case.
+    /// True if the fit of a machine of several coordinates ended elsewhere than within the noise, so that elements
+    /// begin with the values of the case.
     pub is_anew: bool,
     fastest: OnceCell<f64>,
 }

@@ -13,8 +13,8 @@
 //! intervals of half-width h become √(h² + 2 (d² + h′²)) ≥ d + h′, h′ that of the fit with the element.
 //!
 //! A machine of several coordinates swings out of step with a log that a wrong model cannot follow, and its fit ends
-//! anywhere. Where it does not end within the noise, elements begin with the values of the case and a search in windows,
-//! as the fit itself did, row by row, until one leaves noise.
+//! anywhere. Where it does not end within the noise, elements begin with the values of the case and a search in
+//! windows, as the fit itself did, row by row, until one leaves noise.
 
 mod amplifier;
 mod apart;
@@ -165,8 +165,8 @@ fn begun<'a>(site: &Site<'_, 'a>, is_curved: bool, goal: f64) -> Vec<Tried<'a>> 
     starts.into_iter().map(|(_, tried)| tried).collect()
 }
 
-/// True if missing elements are searched for: the residuals are not white, or, of a machine of several coordinates, above
-/// the noise, and the fit supports it.
+/// True if missing elements are searched for: the residuals are not white, or, of a machine of several coordinates,
+/// above the noise, and the fit supports it.
 pub(crate) fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> bool {
     let problem = &found.problem;
     // Noise of a narrow band, such as the swing of a belt, may determine parameters as well as white noise does.

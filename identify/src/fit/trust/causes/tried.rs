@@ -33,9 +33,9 @@ pub(super) struct Tried<'a> {
 }
 
 impl<'a> Tried<'a> {
-    /// The result of the first steps from the end of the fit without the element, or from a search in windows that begins
-    /// with the values of the case; `None` if the model cannot simulate the logs. Steps of curved friction, which take
-    /// long, are not taken where the linear model at the start shows that they will not fall below `goal`.
+    /// The result of the first steps from the end of the fit without the element, or from a search in windows that
+    /// begins with the values of the case; `None` if the model cannot simulate the logs. Steps of curved friction,
+    /// which take long, are not taken where the linear model at the start shows that they will not fall below `goal`.
     pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, goal: f64) -> Option<Self> {
         let mut begun = Self::from(site, row, extended, (&site.found.problem, &site.found.best.x))?;
         if site.is_anew {
@@ -156,8 +156,9 @@ impl<'a> Tried<'a> {
         is_noise(&self.problem, &self.best)
     }
 
-    /// True if the logs may hardly tell another number of a drive or sensor from this one, by the least that its fit may end
-    /// with: with n values, of which slow noise leaves n/i², the logarithm of the likelihood is less by n/i² ln(C′/C)/2.
+    /// True if the logs may hardly tell another number of a drive or sensor from this one, by the least that its fit
+    /// may end with: with n values, of which slow noise leaves n/i², the logarithm of the likelihood is less by n/i²
+    /// ln(C′/C)/2.
     pub fn may_be_like(&self, judged: &Judged, other: &Self) -> bool {
         let is_number = |one: &Self| !one.kind().2.is_empty();
         let is_other = is_number(self) && is_number(other) && self.kind() != other.kind();

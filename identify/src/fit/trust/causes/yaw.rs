@@ -2,8 +2,8 @@
 //!
 //! Motors and belts see the yaw stiffness k_ψ and the moment of inertia by the arm a of the belts only, as k_ψ/a² and
 //! I/a². The bridge begins as a uniform beam between the belts, I = m (2a)²/12. Where the spans of a belt are alike, as
-//! those of a CoreXY about the middle of its travel, their pulls do not turn the bridge, and encoders at the motors do not
-//! show its yaw.
+//! those of a CoreXY about the middle of its travel, their pulls do not turn the bridge, and encoders at the motors do
+//! not show its yaw.
 
 use super::extension::{Extended, Fitted, Said, Site, Telling, shown};
 use crate::fit::limits::{CAUSE_AROUND, YAW_BEARINGS, YAW_SPACING, YAW_STIFFNESS};
