@@ -351,9 +351,15 @@ pub enum Detail {
 pub struct Bench {
     mounted: Option<(Machine, Arc<Mechanism>)>,
     known: known::Known,
+    steps: u64,
 }
 
 impl Bench {
+    /// Steps of all its runs so far.
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
     /// Mounts a machine, unless it is mounted already. Errors: an invalid machine.
     pub fn mount(&mut self, machine: &Machine) -> Result<()> {
         if self.mounted.as_ref().is_some_and(|(mounted, _)| mounted == machine) {
@@ -388,6 +394,7 @@ impl Bench {
         let known = std::mem::take(&mut self.known);
         let (outcome, known) = go(mechanism, experiment, Solver::for_machine(machine), known, output)?;
         self.known = known;
+        self.steps += outcome.cost.steps;
         Ok(outcome)
     }
 }

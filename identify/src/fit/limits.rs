@@ -1127,6 +1127,11 @@ pub(crate) const CAUSE_MOST_VALUES: usize = 100_000;
 /// Unit: values. Source: chosen: bounds the time.
 pub(crate) const CAUSE_MOST_CURVED: usize = 20_000;
 
+/// Most steps of one simulation of all logs with an element whose runs have no exact derivatives.
+///
+/// Unit: steps, of some 10 µs. Source: chosen: bounds the time.
+pub(crate) const CAUSE_MOST_STEPS: u64 = 20_000;
+
 /// Median logarithmic gain of held-out parts from which on one part in which a start fails does not refute an element.
 ///
 /// Unit: the logarithmic gain of the whole logs. Source: chosen. Test:

@@ -563,6 +563,21 @@ impl<'a> Problem<'a> {
         true
     }
 
+    /// Steps of the solver for one simulation of all runs; `None` if one cannot be simulated, or if they are more than
+    /// `most`, as soon as that is known.
+    pub(crate) fn steps(&mut self, x: &[f64], most: u64) -> Option<u64> {
+        let (stages, mut bench) = (self.all_simulated(x), Bench::default());
+        let mut residuals = Vec::new();
+        for index in 0..self.runs.len() {
+            let (rows, own) = (self.runs[index].rows(), self.runs[index].part);
+            residuals.resize(rows, 0.0);
+            if !self.one(&mut bench, index, &stages[own], x, &mut residuals) || bench.steps() > most {
+                return None;
+            }
+        }
+        Some(bench.steps())
+    }
+
     /// The columns of what only shifts the outputs of a run.
     fn shifts(&self, machine: &Machine, (index, first): (usize, usize), jacobian: &mut DMatrix<f64>) {
         let run = &self.runs[index];
@@ -875,5 +890,59 @@ impl Residuals for Problem<'_> {
 
     fn is_exact(&self) -> bool {
         self.differences == 0
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use super::*;
+    use crate::case::{Experiment, Nuisances, TEMPLATE};
+    use crate::log::{Log, Output};
+    use crate::signal::Hold;
+    use crate::solve::{Solver, simulate};
+    use std::sync::Arc;
+
+    /// A pulse of the template with a deviating log, its angle and position with or without an offset.
+    pub(crate) fn case(is_off: bool) -> (Case, Plan) {
+        let rows = ["experiment.0.every=10ms", "experiment.0.until=0.5s"];
+        let mut case = Case::from_text_with("axis.toml", TEMPLATE, &rows).unwrap();
+        case.experiments.truncate(1);
+        let run = simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap().trajectory;
+        let column = |name: &str| run.get(name).unwrap().to_vec();
+        let noise = |k: usize, size: f64| size * (1.0 + (2.1 * k as f64).sin());
+        let outputs = [(Quantity::DriveAngle, 10e-3), (Quantity::CartPosition, 1e-4)].map(|(quantity, size)| {
+            let values = column(quantity.name()).iter().enumerate().map(|(k, v)| v + noise(k, size)).collect();
+            Output { quantity, absolute: false, values }
+        });
+        case.experiments[0].log = Some(Arc::new(Log {
+            name: "a".into(),
+            file: Default::default(),
+            time: column("time"),
+            inputs: vec![column("voltage")],
+            added: None,
+            hold: Hold::Zero,
+            reference: None,
+            outputs: outputs.to_vec(),
+            ended: None,
+        }));
+        let free = vec!["cart.friction.viscous".to_string()];
+        (case, Plan { free, nuisance: Nuisances { bias: is_off, ..Nuisances::default() }, ..Plan::default() })
+    }
+
+    /// Bristles on a stiff belt take so many steps that a Jacobian by differences lasted minutes: a limit ends the
+    /// count as soon as it is exceeded.
+    #[test]
+    fn steps_are_counted_up_to_a_limit() {
+        let (mut case, plan) = case(false);
+        case.experiments.push(Experiment { name: "again".into(), ..case.experiments[0].clone() });
+        let mut problem = Problem::new(&case, &plan).unwrap();
+        let at = problem.start();
+        let all = problem.steps(&at, u64::MAX).unwrap();
+        assert!(all > 0 && problem.simulations == 2);
+        assert_eq!(problem.steps(&at, all), Some(all));
+        assert_eq!(problem.steps(&at, all - 1), None);
+        let before = problem.simulations;
+        assert_eq!(problem.steps(&at, 0), None);
+        assert_eq!(problem.simulations, before + 1);
     }
 }

@@ -316,41 +316,10 @@ impl Residuals for Marginal<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::case::{Case, Nuisances, Plan, TEMPLATE};
-    use crate::log::{Log, Output, Quantity};
-    use crate::signal::Hold;
-    use crate::solve::{Solver, simulate};
+    use crate::fit::asked::problem::tests::case;
     use rand_pcg::rand_core::SeedableRng;
-    use std::sync::Arc;
 
     const T: f64 = 1.7;
-
-    /// A pulse of the template with a deviating log, its angle and position with or without an offset.
-    fn case(is_off: bool) -> (Case, Plan) {
-        let rows = ["experiment.0.every=10ms", "experiment.0.until=0.5s"];
-        let mut case = Case::from_text_with("axis.toml", TEMPLATE, &rows).unwrap();
-        case.experiments.truncate(1);
-        let run = simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap().trajectory;
-        let column = |name: &str| run.get(name).unwrap().to_vec();
-        let noise = |k: usize, size: f64| size * (1.0 + (2.1 * k as f64).sin());
-        let outputs = [(Quantity::DriveAngle, 10e-3), (Quantity::CartPosition, 1e-4)].map(|(quantity, size)| {
-            let values = column(quantity.name()).iter().enumerate().map(|(k, v)| v + noise(k, size)).collect();
-            Output { quantity, absolute: false, values }
-        });
-        case.experiments[0].log = Some(Arc::new(Log {
-            name: "a".into(),
-            file: Default::default(),
-            time: column("time"),
-            inputs: vec![column("voltage")],
-            added: None,
-            hold: Hold::Zero,
-            reference: None,
-            outputs: outputs.to_vec(),
-            ended: None,
-        }));
-        let free = vec!["cart.friction.viscous".to_string()];
-        (case, Plan { free, nuisance: Nuisances { bias: is_off, ..Nuisances::default() }, ..Plan::default() })
-    }
 
     /// ½ |r|²/T at a point, all variables in it.
     fn cost<R: Residuals>(problem: &mut R, x: &[f64]) -> f64 {

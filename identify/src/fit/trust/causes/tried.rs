@@ -7,8 +7,8 @@ use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::asked::run::{Extra, Nuisance};
 use crate::fit::limits::{
-    CAUSE_ALIKE, CAUSE_DIFFERENCE, CAUSE_EXPLAINS, CAUSE_REACH, CAUSE_SLOW, CAUSE_SLOW_STEPS, CAUSE_STEPS, COLOURED,
-    ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS,
+    CAUSE_ALIKE, CAUSE_DIFFERENCE, CAUSE_EXPLAINS, CAUSE_MOST_STEPS, CAUSE_REACH, CAUSE_SLOW, CAUSE_SLOW_STEPS,
+    CAUSE_STEPS, COLOURED, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS,
 };
 use crate::fit::search::least_squares::{minimise, resume};
 use crate::fit::search::point::{Ending, Minimum, Options};
@@ -54,7 +54,7 @@ impl<'a> Tried<'a> {
     }
 
     /// The start of a fit of the machine of a case with the element; variables of single runs begin at those of
-    /// another fit to the same logs.
+    /// another fit to the same logs. `None` if the model cannot simulate the logs, or not in a reasonable time.
     fn from(
         site: &Site<'_, 'a>,
         row: &'static Extension,
@@ -80,6 +80,9 @@ impl<'a> Tried<'a> {
         }
         if start.len() != problem.variables() || problem.is_stopped() {
             return None;
+        }
+        if row.is_curved {
+            problem.steps(&start, CAUSE_MOST_STEPS)?;
         }
         let bounds = problem.bounds();
         let best = Minimum::linearised(&mut problem, &start, &bounds)?;
