@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
 use crate::metrics::Peak;
-use crate::reach::feasible::{Load, Shortfall, limits, loads, loads_of_run, shortfalls_of_run};
+use crate::reach::feasible::{Load, Shortfall, limits, loads, loads_of_run, shortfalls_of_run, without_reserve};
 use crate::reach::quickest::{CLOSELY, INSTANTS, MovePath, Quickest, Share, Wanted, modes};
 use crate::signal::profile::{Leg, Limits, Profile};
 use crate::solve::{Ending, Solver};
@@ -84,7 +84,8 @@ pub struct Planned {
     pub is_kept: bool,
     /// Arrival with the limits of the file.
     pub given: Arrival,
-    /// Limits that the move of the file exceeds, and those of the belt that its run exceeds.
+    /// Limits that the move of the file exceeds, requested ones and the reserve among them, and those of the belt that
+    /// its run exceeds.
     pub shortfalls: Vec<Shortfall>,
     /// The references of the file.
     pub references: Vec<Profile>,
@@ -240,6 +241,12 @@ impl Planner<'_> {
         let (given, slowest) = self.of_family(motion, &motion.profiles, &given)?;
         let (given, ran_given) = self.finished(motion, &motion.profiles, given, slowest)?;
         short.extend(self.beyond(&motion.profiles, &ran_given));
+        short.extend(self.wanted.exceeded_by(&motion.profiles));
+        let shaped = self.design.shaped(&motion.profiles);
+        let used = without_reserve(machine, self.design.bounds(), &shaped, self.wanted.reserve);
+        let is_new = |one: &Shortfall| short.iter().all(|known| known.limit != one.limit);
+        let used: Vec<Shortfall> = used.into_iter().filter(is_new).collect();
+        short.extend(used);
         let is_sooner = short.is_empty() && Tried::rank_of(&given) <= best.rank();
         let mut loads = self.loads(&self.design.shaped(&profiles), |_| CLOSELY);
         loads_of_run(machine, &ran.spans).into_iter().for_each(|load| load.join(&mut loads));

@@ -32,6 +32,12 @@ const CHANGE: f64 = 1e-9;
 /// χ² per residual below which no other start is tried.
 const ENOUGH: f64 = 1.5;
 
+/// Length of the mean P of unit vectors from which on phases are alike: half of that of equal ones.
+const CLEAR: f64 = 0.5;
+
+/// Most half samples of a delay that is looked for in phases, to either side.
+const MOST_LAGS: f64 = 4000.0;
+
 /// Fewest points.
 const FEWEST: usize = 10;
 
@@ -137,9 +143,11 @@ fn curves(
                 .ok_or_else(|| Error::new(format!("the model has no {name}")).next("log another quantity"))
         };
         let outputs = same.iter().map(output).collect::<Result<Vec<_>>>()?;
-        // A straight input is delayed by e^{−jωt_d}, which leaves out what folds down from beyond half the sample rate.
+        // Whole samples of a delay are z⁻ⁿ. A straight input is delayed by e^{−jωt_d} alone, which leaves out what folds
+        // down from beyond half the sample rate.
+        let whole = (delay / first.every).floor() * first.every;
         let (hold, within, late) = match first.hold {
-            signal::Hold::Zero => (Hold::Zero, delay, 0.0),
+            signal::Hold::Zero => (Hold::Zero, (delay - whole).max(0.0), whole),
             signal::Hold::Linear => (Hold::First, 0.0, delay),
         };
         let discrete = of_input.discrete(first.every, hold, within)?;
@@ -189,6 +197,55 @@ impl Problem<'_> {
             }
         }
         Ok(DVector::from_vec(all))
+    }
+
+    /// The delay d that turns the phases of all responses most nearly into those of the model without a delay, or into
+    /// their opposites, s,
+    ///
+    /// ```text
+    /// maximum over d of Σ_i |P_i(d)|,  P_i(d) = mean of (G/|G|) (Ĝ/|Ĝ|)* e^{jωd}
+    /// ```
+    ///
+    /// in steps of half a sample, up to a quarter of a segment (C. H. Knapp, G. C. Carter, IEEE Trans. ASSP 24 (1976)
+    /// 320, the phase transform). Errors: responses of the other sign, Re P_i < 0, or ahead of the input, d < 0.
+    fn lag(&self, x: &[f64]) -> Result<f64> {
+        let turns: Vec<Vec<(f64, Complex<f64>)>> = (self.frfs.iter().zip(self.curves(x)?))
+            .map(|(frf, curve)| {
+                let points = frf.points.iter().zip(curve).filter(|(point, _)| is_used(point));
+                let turn = |(point, model): (&Point, Complex<f64>)| {
+                    let product = point.value * model.conj();
+                    (product.norm() > 0.0).then(|| (point.omega, product / product.norm()))
+                };
+                points.filter_map(turn).collect()
+            })
+            .collect();
+        let mean = |turns: &[(f64, Complex<f64>)], d: f64| {
+            let turned = turns.iter().map(|(omega, turn)| turn * Complex::from_polar(1.0, omega * d));
+            turned.sum::<Complex<f64>>() / turns.len().max(1) as f64
+        };
+        let every = self.frfs.iter().map(|frf| frf.every).fold(f64::INFINITY, f64::min);
+        let longest = self.frfs.iter().map(|frf| frf.length as f64 * frf.every).fold(0.0, f64::max) / 4.0;
+        let most = (2.0 * longest / every).min(MOST_LAGS) as i64;
+        let alike = |d: f64| turns.iter().map(|turns| mean(turns, d).norm()).sum::<f64>();
+        // The shortest of equals.
+        let delays = (0..=most).flat_map(|k| [k, -k]).map(|k| k as f64 * 0.5 * every);
+        let best = delays.map(|d| (alike(d), d)).reduce(|a, b| if b.0 > a.0 { b } else { a });
+        let (_, d) = best.unwrap_or_default();
+        // Beyond a resonance that the model has elsewhere, signs differ for another reason.
+        let low = |turns: &[(f64, Complex<f64>)]| turns[..turns.len().min(FEWEST.max(turns.len() / 4))].to_vec();
+        let is_other = |turns: &[(f64, Complex<f64>)]| mean(turns, d).re < -CLEAR && mean(&low(turns), d).re < -CLEAR;
+        let other: Vec<String> =
+            self.frfs.iter().zip(&turns).filter(|(_, turns)| is_other(turns)).map(|(frf, _)| frf.title()).collect();
+        if !other.is_empty() {
+            return Err(Error::new(format!("the sign of {} is opposite to the model's", other.join(" and ")))
+                .next("negate that column of the log, or its input, or amplifier.gain"));
+        }
+        if d < -every && alike(d) > CLEAR * turns.len() as f64 {
+            return Err(Error::new(format!("the outputs respond {} before the input", engineering(-d, "s", 3)))
+                .allowed("a response after the input")
+                .next("compare the clocks of the columns of the log"));
+        }
+        Ok(d.max(0.0))
     }
 
     fn jacobian(&self, x: &[f64], rows: usize) -> Result<DMatrix<f64>> {
@@ -264,13 +321,25 @@ pub fn fit(machine: &Machine, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
             }
         }
     }
+    let rows = 2 * points;
+    let chi = |squares: f64| squares / (rows - UNKNOWNS) as f64;
+    // Where no start leads near, the phases show a long delay, an output ahead of its input, or one of the other sign.
+    if best.as_ref().is_none_or(|(least, _)| chi(*least) > FAR) {
+        let ratio = if ratio > 0.0 { ratio } else { 1e-5 };
+        let mut start = vec![0.0, ratio.ln(), 0.0, 0.0];
+        start[2] = problem.lag(&start)?;
+        if let Ok((value, x)) = minimised(&problem, start)
+            && best.as_ref().is_none_or(|(least, _)| value < *least)
+        {
+            best = Some((value, x));
+        }
+    }
     let Some((squares, x)) = best else {
         return Err(
             Error::new("no stiffness, damping and delay give the measured response").next("check the case file")
         );
     };
-    let rows = 2 * points;
-    let chi = squares / (rows - UNKNOWNS) as f64;
+    let chi = chi(squares);
     let covariance = problem.covariance(&problem.jacobian(&x, rows)?);
     let wide = |j: usize| {
         let variance = covariance.as_ref().map_or(f64::INFINITY, |covariance| covariance[(j, j)].max(0.0));

@@ -14,6 +14,9 @@ use crate::signal::profile::{Profile, Reference};
 /// Number of instants at which a reference is evaluated.
 const INSTANTS: usize = 4000;
 
+/// Relative excess of a requested limit that rounding explains.
+const ROUNDED: f64 = 1e-6;
+
 /// Share of the pretension that a run takes off a span without slack: a slack span has lost all of it, to rounding.
 const TAUT: f64 = 1.0 - 1e-6;
 
@@ -21,7 +24,8 @@ const TAUT: f64 = 1.0 - 1e-6;
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Shortfall {
-    /// `voltage`, `current`, `pull_out`, `breakaway`, `travel`, `slack`, `tension` or `teeth`.
+    /// `voltage`, `current`, `pull_out`, `breakaway`, `travel`, `slack`, `tension` or `teeth`; of a requested limit
+    /// `speed`, `acceleration` or `jerk`.
     pub limit: &'static str,
     /// Time of the largest requirement, s.
     pub time: f64,
@@ -405,6 +409,70 @@ fn of_breakaway(machine: &Machine, bounds: Bounds, number: usize, instants: &[In
         let words = || format!("breakaway requires {}; {provides} {}", told(needed, "N"), told(force, "N"));
         (side != 0.0 && needed > force).then(|| at.beyond("breakaway", [needed, force], "N", words()))
     })
+}
+
+/// A requested limit: its name, its unit, and the value, if there is one.
+pub(super) type Requested = (&'static str, &'static str, Option<f64>);
+
+/// Those of these limits of speed, acceleration and jerk along a path that references exceed. An acceleration that jumps
+/// exceeds any jerk; on arcs, only the speed counts.
+pub(super) fn along_path(profiles: &[Profile], limits: [Requested; 3]) -> Vec<Shortfall> {
+    let step = Profile::last_end(profiles) / INSTANTS as f64;
+    let arcs: Vec<[f64; 2]> = (profiles.iter().flat_map(Profile::passages))
+        .filter(|passage| passage.turn.is_some())
+        .map(|passage| [passage.begin - step, passage.begin + passage.duration() + step])
+        .collect();
+    let at = |time: f64| profiles.iter().map(|profile| profile.at(time)).collect::<Vec<_>>();
+    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
+    let mut most = [(0.0, 0.0); 3];
+    let mut before = at(0.0);
+    for k in 0..=INSTANTS {
+        let time = step * k as f64;
+        let now = at(time);
+        // |a(t₂) − a(t₁)| ≤ ∫ |j| dt
+        let change = norm(&mut before.iter().zip(&now).map(|(a, b)| b.acceleration - a.acceleration));
+        let values = [
+            norm(&mut now.iter().map(|y| y.speed)),
+            norm(&mut now.iter().map(|y| y.acceleration)),
+            norm(&mut now.iter().map(|y| y.jerk)).max(if step > 0.0 { change / step } else { 0.0 }),
+        ];
+        let is_on_arc = arcs.iter().any(|[begin, end]| (*begin..=*end).contains(&time));
+        for (most, value) in most.iter_mut().zip(values).take(if is_on_arc { 1 } else { 3 }) {
+            if value > most.0 {
+                *most = (value, time);
+            }
+        }
+        before = now;
+    }
+    let exceeded = |((limit, unit, allowed), (needed, time)): (Requested, (f64, f64))| {
+        let allowed = allowed.filter(|allowed| needed > allowed * (1.0 + ROUNDED))?;
+        let at = Instant { time, y: profiles[0].at(time) };
+        let words = format!("reaches {} ({}); {} is requested", told(needed, unit), at.when(), told(allowed, unit));
+        Some(at.beyond(limit, [needed, allowed], unit, words))
+    };
+    limits.into_iter().zip(most).filter_map(exceeded).collect()
+}
+
+/// Limits of the motors of which references, shaper included, leave less than this reserve, 0 to 1.
+pub fn without_reserve(machine: &Machine, bounds: Bounds, profiles: &[Profile], reserve: f64) -> Vec<Shortfall> {
+    let mut found = Vec::new();
+    for drive in 0..machine.drives.len() {
+        let needs = match profiles {
+            [profile] => needs(machine, profile, INSTANTS),
+            _ => needs_of_drive(machine, drive, profiles, INSTANTS),
+        };
+        for demand in of_motor(machine, drive, bounds) {
+            let Some((need, [needed, allowed])) = demand.most(&needs) else { continue };
+            let left = (1.0 - reserve) * allowed;
+            if needed <= left * (1.0 + ROUNDED) {
+                continue;
+            }
+            let [needs, leaves] = [needed, left].map(|value| told(value, demand.unit));
+            let words = format!("needs {needs} ({}); the reserve leaves {leaves}", need.at.when());
+            found.push(need.at.beyond(demand.limit, [needed, left], demand.unit, words));
+        }
+    }
+    found
 }
 
 /// The end of a slide's travel, if its reference exceeds it.

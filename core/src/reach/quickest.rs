@@ -1,7 +1,7 @@
 //! Quickest moves of a machine: speed, acceleration, jerk and snap within its limits, for a gantry along its path, with
 //! jerk and snap times at the zeros of the belt's modes.
 
-use super::feasible::{Load, limits, loads, shortfalls};
+use super::feasible::{Load, Shortfall, along_path, limits, loads, shortfalls};
 use super::resonance::{Drive, reaches, resonances};
 use crate::design::{Bounds, Design};
 use crate::error::{Error, Result};
@@ -67,6 +67,13 @@ impl Wanted {
             true => Ok(()),
             false => Err(Error::new(format!("a reserve of {}", self.reserve)).allowed("from 0 to 0.9")),
         }
+    }
+
+    /// Those of the limits of speed, acceleration and jerk that references exceed.
+    pub fn exceeded_by(&self, profiles: &[Profile]) -> Vec<Shortfall> {
+        let limits =
+            [("speed", "m/s", self.speed), ("acceleration", "m/s^2", self.acceleration), ("jerk", "m/s^3", self.jerk)];
+        along_path(profiles, limits)
     }
 }
 

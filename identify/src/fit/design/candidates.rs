@@ -198,6 +198,11 @@ impl Shape {
         }
     }
 
+    /// True if the input jumps to zero at its end from any value in between.
+    pub(super) fn ends_with_a_jump(&self) -> bool {
+        matches!(self, Self::Chirp { .. } | Self::Multisine { .. })
+    }
+
     /// This candidate with another amplitude.
     pub(super) fn scaled(mut self, factor: f64) -> Self {
         match &mut self {

@@ -32,7 +32,7 @@ pub struct Promise {
     pub value: f64,
     /// Standard error including the error of the model; infinite if not determined.
     pub error: f64,
-    /// Standard error relative to the value, or to a typical one if the value may be zero.
+    /// Standard error relative to the value, or to a typical one if the value is zero.
     pub relative: f64,
     /// Standard error of an exact model, from noise and resolution of the measurement alone.
     pub random: f64,
@@ -296,15 +296,18 @@ impl Task<'_> {
         let known = &information.known;
         let problem = &information.problem;
         let promise = |(j, parameter): (usize, &crate::parameter::Free)| {
-            // √(σ² + ε²) with the relative error ε of the model
-            let (size, relative) = (information.size(j), known.error[j].hypot(self.model_error));
+            let value = problem.value(j, information.x[j]);
+            let random = information.size(j) * known.error[j];
+            let whole = if value == 0.0 { information.size(j) } else { value.abs() };
+            // √(σ² + ε²) with the error ε of the model
+            let error = random.hypot(self.model_error * whole);
             Promise {
                 name: parameter.name.clone(),
                 unit: parameter.unit,
-                value: problem.value(j, information.x[j]),
-                error: size * relative,
-                relative,
-                random: size * known.error[j],
+                value,
+                error,
+                relative: error / whole,
+                random,
                 wanted: self.wanted.contains(&j),
             }
         };

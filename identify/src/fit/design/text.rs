@@ -34,7 +34,9 @@ impl Designed {
             put("initial", format!("{{ {} }}", self.start(machine)));
         }
         let time = samples(self.every, self.duration);
-        if hold(&self.driven.inputs(&self.shape), &time) == Hold::Linear {
+        if self.shape.ends_with_a_jump() {
+            text.push_str("# Keep this input beside a `log` without an input column: samples do not show its end.\n");
+        } else if hold(&self.driven.inputs(&self.shape), &time) == Hold::Linear {
             text.push_str("# In `log`: hold = \"linear\", since this input does not switch.\n");
         }
         text

@@ -84,20 +84,21 @@ pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Waves {
         let x = square / (power * noise.weight).max(f64::MIN_POSITIVE);
         (tried * (-freedom * (x / freedom).ln_1p()).exp()).min(1.0)
     };
+    // Among significant ones the largest, not the least probable: where passes differ less, a side lobe of a large sine
+    // is less probable than the sine.
     let strongest = |left: &[f64], from: f64| {
-        let judged = |f: &f64| (*f, chance(*f, coefficient(left, f * noise.step).norm_sqr()));
-        raster.iter().filter(|f| **f >= from).map(judged).min_by(|a, b| a.1.total_cmp(&b.1))
+        let squares = raster.iter().filter(|f| **f >= from).map(|f| (*f, coefficient(left, f * noise.step).norm_sqr()));
+        let judged = squares.map(|(f, square)| (f, square, chance(f, square)));
+        let significant = judged.filter(|(.., chance)| *chance < MAP_FALSE_ALARM);
+        significant.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(f, _, chance)| (f, chance))
     };
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let whole: Vec<f64> = values.iter().map(|value| value - mean).collect();
-    let mut changes = strongest(&whole, 0.0).is_some_and(|(_, chance)| chance < MAP_FALSE_ALARM);
+    let mut changes = strongest(&whole, 0.0).is_some();
     let (mut numbers, mut found): (Vec<f64>, Vec<(bool, f64)>) = (Vec::new(), Vec::new());
     for _ in 0..MAP_WAVES {
         let Some(left) = without(values, &numbers, noise.step) else { break };
         let Some((first, chance)) = strongest(&left, MAP_PERIODS / length) else { break };
-        if chance >= MAP_FALSE_ALARM {
-            break;
-        }
         changes = true;
         let power = |f: f64| coefficient(&left, f * noise.step).norm_sqr();
         let number = golden::top([first - step, first + step], MAP_SECTIONS, power);
