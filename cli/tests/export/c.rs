@@ -198,10 +198,12 @@ fn only_a_command_that_is_not_finite_is_zero() {
     if !are_there(&["gcc"]) {
         return;
     }
-    let limit = "controller.limit=1e307 V";
-    let folder = exported(&controller("pid"), &[limit], &["--part", "controller"]);
-    let text = super::st::changed(&controller("pid"), &[limit]);
-    let case = opened("stages/sollmann-jouaneh/controllers/pid.toml", &[limit]);
+    // A controller without a limit.
+    let pid =
+        "controller={ every = \"1 ms\", pid = { proportional = 100, integral = 0, derivative = 0, filter = 200 } }";
+    let folder = exported(&controller("pid"), &[pid], &["--part", "controller"]);
+    let text = super::st::changed(&controller("pid"), &[pid]);
+    let case = opened("stages/sollmann-jouaneh/controllers/pid.toml", &[pid]);
     for (position, is_finite) in [(-1e30, true), (-1e60, true), (1e290, true), (-1e308, false), (f64::NAN, false)] {
         let mut seen = [0.0; 12];
         seen[10] = position;
@@ -217,7 +219,7 @@ fn only_a_command_that_is_not_finite_is_zero() {
         assert_eq!(super::st::replayed(&text, &[(seen, given)]), [given], "Structured Text, {position:e} m");
     }
     // The numbers of 32 bits end earlier.
-    let folder = exported(&controller("pid"), &[limit], &["--part", "controller", "--real", "float"]);
+    let folder = exported(&controller("pid"), &[pid], &["--part", "controller", "--real", "float"]);
     for (position, is_finite) in [(-1e30, true), (-1e38, false)] {
         let mut seen = [0.0; 12];
         seen[10] = position;
