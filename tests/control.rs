@@ -250,6 +250,45 @@ fn a_riccati_equation_without_a_solution_says_so() {
     assert!(error.contains("no stabilising solution") || error.contains("solved to"), "{error}");
 }
 
+/// Pulleys and spans alike on both sides, without damping: the pulleys vibrate against each other, and the cart, which
+/// alone is weighted, stands still. Rounding decides whether the regulator's equation can be solved then. The error spoke
+/// of a state that is to be given a weight, and there is none for it.
+#[test]
+fn a_vibration_without_the_cart_is_named_with_its_frequency() {
+    let built = |mass: f64, second: f64, damping: f64, friction: f64| {
+        let pulley = format!("inertia = 4.864e-7\nfriction = {{ viscous = {friction:e}, coulomb = 0, static = 0 }}\n");
+        let text = format!(
+            "[motor]\ntorque_constant = 4.287e-1\nback_emf_constant = 4.287e-1\nresistance = 54\ngear_ratio = 1\n\
+             gear_efficiency = 0.6247\n[amplifier]\nmode = \"current\"\ngain = 0.7912\n\
+             [drive_pulley]\nradius = 7.995e-3\n{pulley}[idler_pulley]\n{pulley}\
+             [cart]\nmass = {mass:e}\nfriction = {{ viscous = 9.694e-2, coulomb = 0, static = 1.388e-2 }}\n\
+             [belt]\nstiffness = [1.046e7, {second:e}, 5.171e6]\ndamping = [{damping}, {damping}, {damping}]\n\
+             [encoder]\nat = \"drive_pulley\"\nlines = 45090\n\
+             [controller]\nevery = 1.647e-5\n\
+             state_feedback = {{ position = 2.1e-5, command = 0.1236, disturbance = 3.708e-2, noise = 4.2e-8 }}\n"
+        );
+        let case = Case::from_text("axis.toml", &text).unwrap();
+        Standard::new(case.controller.as_ref().unwrap(), &case.machine).map(drop)
+    };
+    let masses: Vec<f64> = (0..12).map(|k| 4.044e-3 * (1.0 + 0.1 * f64::from(k))).collect();
+    // ω² = (k₁ + 2 k₃) r²/J
+    let hertz = ((1.046e7 + 2.0 * 5.171e6) * 7.995e-3_f64.powi(2) / 4.864e-7).sqrt() / std::f64::consts::TAU;
+    let refused: Vec<String> =
+        masses.iter().filter_map(|mass| built(*mass, 1.046e7, 0.0, 0.0).err()).map(|error| error.to_string()).collect();
+    println!("{} of {} are refused", refused.len(), masses.len());
+    assert!(!refused.is_empty());
+    for error in refused {
+        assert!(error.contains("no stabilising solution") && error.contains("in [belt]"), "{error}");
+        assert!(error.contains(&format!("{hertz:.4} Hz")), "{error}");
+    }
+    // Unequal spans, some damping or friction suffice.
+    for mass in masses {
+        for (second, damping, friction) in [(2e7, 0.0, 0.0), (1.046e7, 1.0, 0.0), (1.046e7, 0.0, 1e-7)] {
+            built(mass, second, damping, friction).unwrap();
+        }
+    }
+}
+
 /// Every structure, with gains that make sense on the paper's machine.
 fn structures() -> Vec<Structure> {
     let rules = vec![vec![-1.0, -0.5, 0.0], vec![-0.5, 0.0, 0.5], vec![0.0, 0.5, 1.0]];

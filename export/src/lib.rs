@@ -88,6 +88,16 @@ pub enum Real {
     Double,
 }
 
+impl Real {
+    /// The largest finite number.
+    pub(crate) fn largest(self) -> f64 {
+        match self {
+            Real::Float => f64::from(f32::MAX),
+            Real::Double => f64::MAX,
+        }
+    }
+}
+
 /// Options of an export.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Options {

@@ -31,6 +31,13 @@ const COLUMNS: usize = 8;
 const EXPLICIT: [usize; COLUMNS] = [2, 4, 6, 8, 10, 12, 14, 16];
 const IMPLICIT: [usize; COLUMNS] = [2, 6, 10, 14, 22, 34, 50, 70];
 
+/// Part of a step over which slopes of indicators are taken.
+const DIFFERENCE: f64 = 1e-4;
+
+/// How often a step is halved in any case to find an indicator that falls and rises again within it, and at most.
+const HALVED: usize = 2;
+const DEEPEST: usize = 40;
+
 /// Steps and events after which it gives up.
 const MOST: usize = 300_000;
 
@@ -44,12 +51,46 @@ struct Importer<'a> {
     states: Vec<f64>,
     /// The length of step that suits it.
     step: f64,
-    /// The longest step: a condition that falls and rises again within one goes unseen.
+    /// The longest step.
     longest: f64,
     work: usize,
     next_event: Option<f64>,
     /// True if some of its rates may be far faster than its motion.
     is_stiff: bool,
+}
+
+/// A moment of a step.
+struct Moment {
+    /// Since the start of the step, s.
+    after: f64,
+    states: Vec<f64>,
+    /// The indicators, and their slopes along the motion, 1/s.
+    values: Vec<f64>,
+    slopes: Vec<f64>,
+}
+
+impl Moment {
+    /// Which indicators are above zero.
+    fn holds(&self) -> impl Iterator<Item = bool> {
+        self.values.iter().map(|value| *value > 0.0)
+    }
+
+    /// True if each indicator has the same sign at another moment.
+    fn is_as(&self, other: &Moment) -> bool {
+        self.holds().eq(other.holds())
+    }
+
+    /// True if an indicator falls here, rises at a later moment, and the two tangents meet at zero or below.
+    fn may_dip(&self, later: &Moment) -> bool {
+        let apart = later.after - self.after;
+        let here = self.values.iter().zip(&self.slopes);
+        let mut pairs = here.zip(later.values.iter().zip(&later.slopes));
+        pairs.any(|((a, slope), (b, rise))| {
+            // a + s slope = b − (apart − s) rise
+            let s = (b - a - apart * rise) / (slope - rise);
+            *a > 0.0 && *slope < 0.0 && *rise > 0.0 && a + s * slope <= 0.0
+        })
+    }
 }
 
 impl Importer<'_> {
@@ -90,11 +131,79 @@ impl Importer<'_> {
         Ok(rates)
     }
 
-    fn indicators(&mut self, from: f64, time: f64, states: &[f64]) -> Result<Vec<bool>, String> {
+    fn residuals(&mut self, from: f64, time: f64, states: &[f64]) -> Result<Vec<f64>, String> {
         self.put(from, time, states)?;
         let mut values = vec![0.0; self.opened.model.conditions];
         self.instance.residuals(&mut values).map_err(told)?;
-        Ok(values.into_iter().map(|value| value > 0.0).collect())
+        Ok(values)
+    }
+
+    fn indicators(&mut self, from: f64, time: f64, states: &[f64]) -> Result<Vec<bool>, String> {
+        Ok(self.residuals(from, time, states)?.into_iter().map(|value| value > 0.0).collect())
+    }
+
+    /// The indicators `after` a time, and their slopes along the motion by central differences over a part of `h`.
+    fn moment(&mut self, after: f64, states: Vec<f64>, h: f64) -> Result<Moment, String> {
+        let (from, time, apart) = (self.time, self.time + after, DIFFERENCE * h);
+        let values = self.residuals(from, time, &states)?;
+        let rates = self.rates(from, time, &states)?;
+        let mut beside = |d: f64| {
+            let moved: Vec<f64> = states.iter().zip(&rates).map(|(y, f)| y + d * f).collect();
+            self.residuals(from, time + d, &moved)
+        };
+        let (before, behind) = (beside(-apart)?, beside(apart)?);
+        let slopes = behind.iter().zip(&before).map(|(b, a)| (b - a) / (2.0 * apart)).collect();
+        Ok(Moment { after, states, values, slopes })
+    }
+
+    /// The first change of an indicator within a step of `h` that ends in `last`, to the last bits of time: how long
+    /// after the start it comes, s, and the state there. One that is undone within the step is found, too.
+    fn first_change(&mut self, start: &[f64], (h, last): (f64, &[f64])) -> Result<Option<(f64, Vec<f64>)>, String> {
+        let (from, mut first) = (self.time, None);
+        let begin = self.moment(0.0, start.to_vec(), h)?;
+        let was: Vec<bool> = begin.holds().collect();
+        let mut end = self.moment(h, last.to_vec(), h)?;
+        loop {
+            let changed = match end.is_as(&begin) {
+                false => Some((end.after, end.states.clone())),
+                true => self.hidden([&begin, &end], h, 0)?,
+            };
+            let Some((mut high, mut beyond)) = changed else { return Ok(first) };
+            let (mut low, mut before) = (0.0, start.to_vec());
+            while high - low > (4.0 * f64::EPSILON * (from + high)).max(f64::MIN_POSITIVE) {
+                let middle = 0.5 * (low + high);
+                if middle <= low || middle >= high {
+                    break;
+                }
+                let (states, _) = self.extrapolated(middle)?;
+                match self.indicators(from, from + middle, &states)? == was {
+                    true => (low, before) = (middle, states),
+                    false => (high, beyond) = (middle, states),
+                }
+            }
+            first = Some((high, beyond));
+            end = self.moment(low, before, h)?;
+        }
+    }
+
+    /// A time within a step of `h` between two moments, and the state there, at which an indicator has changed that is
+    /// as it was at both. A step is halved twice in any case, since it may be as long as a period of the machine, and
+    /// then where the tangents of an indicator meet below zero: above them lies the curve, which is convex there.
+    fn hidden(&mut self, [low, high]: [&Moment; 2], h: f64, depth: usize) -> Result<Option<(f64, Vec<f64>)>, String> {
+        let is_narrow = high.after - low.after <= 64.0 * f64::EPSILON * (self.time + high.after);
+        if is_narrow || depth >= DEEPEST || (depth >= HALVED && !low.may_dip(high)) {
+            return Ok(None);
+        }
+        let after = 0.5 * (low.after + high.after);
+        let (states, _) = self.extrapolated(after)?;
+        let middle = self.moment(after, states, h)?;
+        if !middle.is_as(low) {
+            return Ok(Some((after, middle.states)));
+        }
+        match self.hidden([low, &middle], h, depth + 1)? {
+            Some(found) => Ok(Some(found)),
+            None => self.hidden([&middle, high], h, depth + 1),
+        }
     }
 
     /// The error that each quantity may have after a step of `h`: the tolerance, but no less than rounding. Far from
@@ -232,7 +341,6 @@ impl Importer<'_> {
             let limit = self.next_event.filter(|next| *next > self.time + near).unwrap_or(until).min(until);
             let h = self.step.min(self.longest).min(limit - self.time);
             let (from, start) = (self.time, self.states.clone());
-            let was = self.indicators(from, from, &start)?;
             let (states, error) = self.extrapolated(h)?;
             let reach = h * (0.8 * error.max(1e-12).powf(-1.0 / 15.0)).clamp(0.2, 2.5);
             if error > 1.0 {
@@ -242,34 +350,21 @@ impl Importer<'_> {
             if h >= 0.999 * self.step || reach < self.step {
                 self.step = reach;
             }
-            let is = self.indicators(from, from + h, &states)?;
-            if is == was {
-                let at_limit = (from + h - limit).abs() <= near;
-                self.time = if at_limit { limit } else { from + h };
-                self.states = states;
-                let (time, states) = (self.time, self.states.clone());
-                self.put(from, time, &states)?;
-                let due = self.next_event.is_some_and(|next| next <= self.time + near);
-                if due || self.instance.has_fallen().map_err(told)? {
-                    self.event()?;
-                }
+            let changed = self.first_change(&start, (h, &states))?;
+            if let Some((after, beyond)) = changed {
+                (self.time, self.states) = (from + after, beyond);
+                self.event()?;
                 continue;
             }
-            // The earliest change, to the last bits of time.
-            let (mut low, mut high, mut beyond) = (0.0, h, states);
-            while high - low > (4.0 * f64::EPSILON * (from + high)).max(f64::MIN_POSITIVE) {
-                let middle = 0.5 * (low + high);
-                if middle <= low || middle >= high {
-                    break;
-                }
-                let (states, _) = self.extrapolated(middle)?;
-                match self.indicators(from, from + middle, &states)? == was {
-                    true => low = middle,
-                    false => (high, beyond) = (middle, states),
-                }
+            let at_limit = (from + h - limit).abs() <= near;
+            self.time = if at_limit { limit } else { from + h };
+            self.states = states;
+            let (time, states) = (self.time, self.states.clone());
+            self.put(from, time, &states)?;
+            let due = self.next_event.is_some_and(|next| next <= self.time + near);
+            if due || self.instance.has_fallen().map_err(told)? {
+                self.event()?;
             }
-            (self.time, self.states) = (from + high, beyond);
-            self.event()?;
         }
         self.time = until;
         Ok(!self.instance.is_over())

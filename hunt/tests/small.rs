@@ -61,6 +61,42 @@ fn what_the_hunt_had_wrong_once_agrees() {
     }
 }
 
+/// Cases of model exchange in which a condition falls and rises again within a step of the hunt's importer, which looked
+/// at the ends of its steps alone: a pulley that sticks for 0.7 ms (4815), that turns round for 0.3 µs (5983).
+#[test]
+fn an_importer_finds_conditions_that_fall_and_rise_within_a_step() {
+    for number in [4815, 5983] {
+        let outcome = stages::pair(3, number);
+        assert!(outcome.features.contains(&Feature::Asked(By::ModelExchange)));
+        let agrees = outcome.compared.iter().all(|one| one.verdict == Verdict::Agrees && one.difference < 1e-8);
+        assert!(agrees && !outcome.compared.is_empty(), "{}", stages::told(3, &[outcome], true));
+    }
+}
+
+/// A drawn axis with state feedback has a regulator: this one had pulleys that vibrate for ever while the cart, which
+/// alone is weighted, stands still.
+#[test]
+fn an_axis_with_state_feedback_has_a_regulator() {
+    let outcome = stages::pair(3, 4729);
+    assert!(outcome.features.contains(&Feature::StateFeedback));
+    let agrees = outcome.compared.iter().all(|one| one.verdict == Verdict::Agrees);
+    assert!(agrees && !outcome.compared.is_empty(), "{}", stages::told(3, &[outcome], true));
+}
+
+/// Unstable loops whose commands pass 3.4e38 V: exported C in numbers of 64 bits took them for zero.
+#[test]
+fn a_diverging_loop_in_c_goes_on_beyond_numbers_of_32_bits() {
+    if !taut_hunt::c::has_compiler() {
+        return;
+    }
+    for number in [5306, 6714] {
+        let outcome = stages::pair(3, number);
+        assert!(outcome.features.contains(&Feature::Asked(By::C)));
+        let known = outcome.compared.iter().all(|one| !one.verdict.is_unexplained());
+        assert!(known && !outcome.compared.is_empty(), "{}", stages::told(3, &[outcome], true));
+    }
+}
+
 /// Cases of pairs, by seed and number, in which a step of the general solver up to a reversal missed the peak of a
 /// Stribeck curve; co-simulation was off by 8.7e-7 m and 1.8e-6 m.
 #[test]

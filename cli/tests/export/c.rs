@@ -191,6 +191,45 @@ fn the_controller_replays_moves_bit_for_bit() {
     }
 }
 
+/// A command above the largest number of 32 bits was taken as zero in 64 bits, too: a diverging loop in C went another
+/// way than by `taut move` from 3.4e38 V on. One that is not finite is still zero, as there.
+#[test]
+fn only_a_command_that_is_not_finite_is_zero() {
+    if !are_there(&["gcc"]) {
+        return;
+    }
+    // A controller without a limit.
+    let pid =
+        "controller={ every = \"1 ms\", pid = { proportional = 100, integral = 0, derivative = 0, filter = 200 } }";
+    let folder = exported(&controller("pid"), &[pid], &["--part", "controller"]);
+    let text = super::st::changed(&controller("pid"), &[pid]);
+    let case = opened("stages/sollmann-jouaneh/controllers/pid.toml", &[pid]);
+    for (position, is_finite) in [(-1e30, true), (-1e60, true), (1e290, true), (-1e308, false), (f64::NAN, false)] {
+        let mut seen = [0.0; 12];
+        seen[10] = position;
+        let mut own = Standard::new(case.controller.as_ref().unwrap(), &case.machine).unwrap();
+        let still = Reference::default();
+        let asked =
+            own.step(&Observation { time: 0.0, reference: still, ahead: still, position, scale: None, current: 0.0 });
+        let given = if is_finite { asked } else { 0.0 };
+        assert_eq!(asked.is_finite(), is_finite, "{asked:e}");
+        write_doubles(&folder.path().join("in.bin"), seen);
+        run_here(folder.path(), "control.c", &[]);
+        assert_eq!(doubles(&folder.path().join("out.bin")), [given], "C, {position:e} m");
+        assert_eq!(super::st::replayed(&text, &[(seen, given)]), [given], "Structured Text, {position:e} m");
+    }
+    // The numbers of 32 bits end earlier.
+    let folder = exported(&controller("pid"), &[pid], &["--part", "controller", "--real", "float"]);
+    for (position, is_finite) in [(-1e30, true), (-1e38, false)] {
+        let mut seen = [0.0; 12];
+        seen[10] = position;
+        write_doubles(&folder.path().join("in.bin"), seen);
+        run_here(folder.path(), "control.c", &[]);
+        let given = doubles(&folder.path().join("out.bin"))[0];
+        assert_eq!(given != 0.0, is_finite, "{position:e} m: {given:e}");
+    }
+}
+
 /// Gantries in closed loop, with changes.
 pub const GANTRIES: [(&str, &[&str]); 7] = [
     ("stages/h-frame/square.toml", &[]),

@@ -19,7 +19,7 @@ fn exported(name: &str) -> String {
     changed(name, &[])
 }
 
-fn changed(name: &str, changes: &[&str]) -> String {
+pub fn changed(name: &str, changes: &[&str]) -> String {
     let folder = tempfile::tempdir().unwrap();
     let mut words = vec!["export", "st", name, "--out", "x.st"];
     changes.iter().for_each(|change| words.extend(["--set", change]));

@@ -7,11 +7,12 @@ use super::riccati;
 use super::sampled::Sensor;
 use crate::calculator::{Calculator, Slot, Slots, less, more};
 use crate::design::{Design, StateFeedback};
-use crate::error::Result;
+use crate::error::{Error, Result};
+use crate::linear::eigen::{balance, eigenvalues, scaled};
 use crate::machine::Machine;
 use crate::machine::axis::{CART, IDLER};
 use crate::machine::rigid::Rigid;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, RowDVector};
 
 /// Maximum number of states of an axis.
 const STATES: usize = 2 * crate::mechanism::BODIES + crate::mechanism::DRIVES;
@@ -123,7 +124,7 @@ impl StateFeedbackLaw {
             q[(last, last)] = 1.0 / (scale * scale);
         }
         let r = DMatrix::from_element(1, 1, 1.0 / (weights.command * weights.command));
-        let regulator = riccati::discrete(&a, &b, &q, &r)?;
+        let regulator = riccati::discrete(&a, &b, &q, &r).map_err(|error| explained(error, &linear))?;
 
         // The filter is the transposed problem; the disturbance acts at the command, and as the same force at the cart.
         let force = Rigid::new(machine).force_per_command();
@@ -284,6 +285,41 @@ impl Law for StateFeedbackLaw {
             c.keep(self.estimate[i], next);
         }
     }
+}
+
+/// The error of the regulator's equation, with its reason if that is known.
+fn explained(error: Error, linear: &Linear) -> Error {
+    let Some(hertz) = vibration_without_cart(linear) else { return error };
+    Error::new(format!(
+        "the Riccati equation of the state feedback has no stabilising solution: the axis vibrates at {hertz:.4} Hz \
+         without damping while its cart stands still, and only the cart is weighted"
+    ))
+    .allowed("vibrations that move the cart or decay by themselves")
+    .next("give the spans damping in [belt], or the pulleys viscous friction; a real axis has both")
+}
+
+/// Relative size below which damping, or the motion of the cart in a vibration, is rounding.
+const NOTHING: f64 = 1e-9;
+
+/// Frequency, Hz, of an undamped vibration in which the cart stands still, as that of a belt whose pulleys and spans
+/// are alike on both sides. It is not observable from the cart, so no weight of the cart makes the regulator damp it.
+fn vibration_without_cart(linear: &Linear) -> Option<f64> {
+    let (n, scale) = (linear.a.nrows(), balance(&linear.a));
+    let a = scaled(&linear.a, &scale);
+    let vibrations = eigenvalues(&linear.a).ok()?;
+    let mut undamped = vibrations.iter().filter(|pole| pole.im > 0.0 && pole.re.abs() <= NOTHING * pole.im);
+    undamped.find_map(|pole| {
+        // (A² + ω² 1) x = 0, c x = 0 and c A x = 0 with x ≠ 0
+        let of_vibration = &a * &a + DMatrix::identity(n, n) * (pole.im * pole.im);
+        let size = of_vibration.norm();
+        let mut rows = of_vibration.resize_vertically(n + 2, 0.0);
+        for (row, cart) in [&linear.cart, &linear.cart_speed].into_iter().enumerate() {
+            let cart = RowDVector::from_fn(n, |_, j| cart[j] * scale[j]);
+            rows.set_row(n + row, &(&cart * (size / cart.norm())));
+        }
+        let least = rows.svd(false, false).singular_values.min();
+        (least <= NOTHING * size).then(|| pole.im / std::f64::consts::TAU)
+    })
 }
 
 /// The sensors of the Kalman filter with their gains. Their noise is independent, so they may correct sequentially: L =

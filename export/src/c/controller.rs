@@ -6,7 +6,7 @@ use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
 use crate::program::{Expr, Node, Operator, Program, Statement, Test, sign};
-use crate::shaper_remark;
+use crate::{Real, shaper_remark};
 use std::fmt::Write;
 
 const HEADER: &str = include_str!("controller.h");
@@ -22,10 +22,10 @@ pub(super) struct Controller {
 }
 
 impl Controller {
-    /// That of a drive.
-    pub(super) fn new(design: &Design, machine: &Machine, drive: usize) -> Result<Self> {
+    /// The controller of a drive, in numbers of this type.
+    pub(super) fn new(design: &Design, machine: &Machine, drive: usize, real: Real) -> Result<Self> {
         let unit = machine.drives[drive].amplifier.mode.unit();
-        let program = program(design, machine, drive)?;
+        let program = program(design, machine, drive, real.largest())?;
         Ok(Self { design: design.clone(), program, unit, slides: slides(machine) })
     }
 

@@ -36,7 +36,7 @@ pub(super) fn named(case: &Case, part: Part, (stem, name): (&str, &str), options
         let (case, design) = super::controller(case)?;
         let drives = case.machine.geometry().drives;
         for (number, at) in drives.iter().enumerate() {
-            let controller = controller::Controller::new(design, &case.machine, number)?;
+            let controller = controller::Controller::new(design, &case.machine, number, options.real)?;
             match drives {
                 [_] => {
                     header += &controller.header(&writer);

@@ -29,8 +29,9 @@ pub(super) fn input(of: &str, slide: &str, derivative: &str) -> String {
     [of, slide, derivative].into_iter().filter(|word| !word.is_empty()).collect::<Vec<_>>().join("_")
 }
 
-/// The program of a drive by a design for a model of the machine. Errors: what no controller can be.
-pub(super) fn program(design: &Design, model: &Machine, drive: usize) -> Result<Program> {
+/// The program of a drive by a design for a model of the machine, for numbers of up to `largest`. Errors: what no
+/// controller can be.
+pub(super) fn program(design: &Design, model: &Machine, drive: usize, largest: f64) -> Result<Program> {
     // Designs that `taut move` refuses are refused here.
     let text = Text::of_drive(design, model, drive)?;
     if reads_scale(design, model) {
@@ -76,10 +77,10 @@ pub(super) fn program(design: &Design, model: &Machine, drive: usize) -> Result<
     if let Some(outside) = outside {
         asked = asked + outside;
     }
-    c.remark("a command that is not a number is taken as zero; then the limit");
-    let (zero, most) = (c.number(0.0), f64::from(f32::MAX));
-    let low = c.choose(more(asked, most), zero, asked);
-    let finite = c.choose(at_least(asked, -most), low, zero);
+    c.remark("a command that is not finite is taken as zero; then the limit");
+    let zero = c.number(0.0);
+    let low = c.choose(more(asked, largest), zero, asked);
+    let finite = c.choose(at_least(asked, -largest), low, zero);
     let mut given = c.name("finite", finite);
     if let Some(limit) = design.limit {
         given = c.within(given, -limit, limit);

@@ -26,7 +26,7 @@ pub(super) fn export(case: &Case, part: Option<Part>, stem: &str) -> Result<Expo
             [_] => format!("{}_controller", identifier(stem)),
             _ => format!("{}_{}_controller", identifier(stem), at.side()),
         };
-        let program = program(design, &case.machine, number)?;
+        let program = program(design, &case.machine, number, f64::MAX)?;
         let unit = case.machine.drives[number].amplifier.mode.unit();
         texts.push(function_block(case, design, &program, (&name, unit)));
         names.push(name);

@@ -180,7 +180,7 @@ impl Draw {
 
     pub(super) fn belt(&mut self, sizes: &Sizes) {
         let [k1, k2, k3] = sizes.stiffness;
-        let [c1, c2, c3] = sizes.damping;
+        let [c1, c2, c3] = if self.vibrates_without_cart(sizes) { self.some_damping(sizes) } else { sizes.damping };
         self.table("belt");
         if self.wants(Feature::Follows) {
             let rigidity = self.rigidity(sizes, &sizes.stiffness);
@@ -196,6 +196,28 @@ impl Draw {
             let pretension = sizes.force * self.random.decades(0.01, 10.0);
             self.line("pretension", pretension.max(1e-14));
         }
+    }
+
+    /// True if the pulleys of an axis with state feedback vibrate against each other for ever while the cart stands
+    /// still. The weights of a regulator are those of the cart: there is none for such an axis, and taut refuses it.
+    fn vibrates_without_cart(&self, sizes: &Sizes) -> bool {
+        let pulleys = ["[drive_pulley]", "[idler_pulley]"];
+        let is_smooth = |table: &str| {
+            let rest = self.text.split_once(table).map_or("", |(_, rest)| rest);
+            rest.split("\n[").next().is_some_and(|table| table.contains("{ viscous = 0e0,"))
+        };
+        self.wants(Feature::StateFeedback)
+            && sizes.symmetric
+            && sizes.model == "elastic"
+            && sizes.damping == [0.0; 3]
+            && pulleys.into_iter().all(is_smooth)
+            && self.text.contains("mode = \"current\"")
+            && !self.text.contains("rotor_inertia")
+    }
+
+    /// Damping of each span of 1 % of what is critical for a pulley.
+    fn some_damping(&self, sizes: &Sizes) -> [f64; 3] {
+        sizes.stiffness.map(|k| self.digits(0.02 * (k * sizes.mass[0]).sqrt()))
     }
 
     /// E A that makes every span longer than what the cart may take of it.
