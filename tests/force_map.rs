@@ -134,7 +134,24 @@ fn a_hidden_force_is_found() {
     assert!(inside as f64 >= 0.9 * all as f64, "{inside} of {all}");
 }
 
-/// A controller that knows the map errs less; one of a machine without a force has nothing to learn.
+/// Where the passes differ at the period of the largest sine, its side lobes were less probable, and named in its place.
+#[test]
+fn the_largest_sine_is_named_first() {
+    let slow = ["move.0.speed=30 mm/s", "move.0.points=['285 mm', '0 mm']", "move.0.until=22 s"];
+    let plain = case(&slow);
+    for (seed, (period, phase)) in [(20.3e-3, 2.5), (22e-3, 1.0), (35e-3, 2.5)].into_iter().enumerate() {
+        let at = |x: f64| 0.4 * (2.0 * PI * x / period + phase).sin();
+        let point = |k: usize| (k as f64 / 99.0) * 0.3 - 0.007;
+        let points: Vec<String> = (0..100).map(|k| format!("[{}, {}]", point(k), at(point(k)))).collect();
+        let line = format!("cart.force_along=[{}]", points.join(", "));
+        let truth = case(&[&slow[..], &[&line]].concat());
+        let found = learned(&plain, &truth, seed as u64);
+        let first = found.components.first().unwrap_or_else(|| panic!("{period}: nothing"));
+        assert!((first.period[0] / period - 1.0).abs() < 0.01, "{period} {phase}: {:#?}", found.components);
+        assert!((first.amplitude[0] / 0.4 - 1.0).abs() < 0.1, "{period} {phase}: {:#?}", found.components);
+    }
+}
+
 /// Sines of 8.55, 4.39 and 4.35 N that nearly cancel were named in a map of 1 N: a sine per turn, and one that the
 /// points of the map just resolve.
 #[test]
@@ -158,6 +175,7 @@ fn sines_that_cancel_are_not_named() {
     }
 }
 
+/// A controller that knows the map errs less; one of a machine without a force has nothing to learn.
 #[test]
 fn feed_forward_of_a_map_reduces_the_error() {
     let plain = case(&[]);

@@ -167,6 +167,44 @@ fn stiffness_damping_and_delay() {
     assert!(low < 1.3 && 1.3 < high && high - low < 0.05, "{low} {high}");
 }
 
+/// Delays of many samples were states of the model, of which there were as many as the fit tried: it did not end on logs
+/// that are late, early or of the other sign.
+#[test]
+fn long_delays_are_found_and_early_or_negated_outputs_are_named() {
+    let truth = model(&stage(), 20.4e-3);
+    let made = log(&truth, &white(20_000, 3.0), None, 2e-6, 20_000);
+    let fitted = |log: &Log| {
+        let frfs = estimate(log, &Cut { segment: Some(1.024), period: None }).unwrap();
+        fit(&stage(), &Known { place: 0.0, bridge: 0.0, delay: 0.0 }, &frfs)
+    };
+    let found = fitted(&made).unwrap();
+    let (delay, [low, high]) = found.delay;
+    assert!(
+        (delay - 20.4e-3).abs() < 0.05e-3 && low <= delay && delay <= high && !found.is_far(),
+        "{delay} {}",
+        found.chi
+    );
+    assert!((found.stiffness.0 - 1.0).abs() < 0.01, "{:?}", found.stiffness);
+    let changed = |change: &dyn Fn(&mut Vec<f64>)| {
+        let mut log = made.clone();
+        change(&mut log.outputs[0].values);
+        fitted(&log).unwrap_err().to_string()
+    };
+    let early = changed(&|values| {
+        values.drain(..40);
+        values.extend([0.0; 40]);
+    });
+    // 40 ms before an answer that is 20.4 ms late, within half a sample.
+    assert!(early.contains("19.5") && early.contains("before the input"), "{early}");
+    let negated = changed(&|values| values.iter_mut().for_each(|value| *value = -*value));
+    assert!(negated.contains("the sign of made: drive_angle is opposite to the model's"), "{negated}");
+    let mut turned = stage();
+    turned.drives[0].amplifier.gain = -1.0;
+    let frfs = estimate(&made, &Cut { segment: Some(1.024), period: None }).unwrap();
+    let error = fit(&turned, &Known { place: 0.0, bridge: 0.0, delay: 0.0 }, &frfs).unwrap_err().to_string();
+    assert!(error.contains("opposite"), "{error}");
+}
+
 /// A log whose input is straight between samples, for which the model of a held one would be 17 % too stiff.
 #[test]
 fn a_straight_input_is_modelled_as_such() {

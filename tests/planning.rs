@@ -236,6 +236,40 @@ fn limits_of_the_user_are_kept() {
     }
 }
 
+/// The limits of the file stayed where they arrived sooner, although they were above those that the user had given.
+#[test]
+fn limits_of_the_file_beyond_those_of_the_user_are_not_kept() {
+    let case = case(&["tune.spread=0", "tune.places=1"]);
+    let file = case.moves[0].profile();
+    let beyond = |wanted: Wanted, limit: &str| {
+        let plans = plan(&case, &[0], &wanted, &|| false).unwrap();
+        let planned = &plans.moves[0];
+        assert!(!planned.is_kept, "{limit}: {:?}", planned.shortfalls);
+        let short = planned.shortfalls.iter().find(|short| short.limit == limit);
+        let short = short.unwrap_or_else(|| panic!("{limit}: {:?}", planned.shortfalls));
+        assert!(
+            short.needed > short.allowed
+                && short.words.contains(if limit == "voltage" { "reserve" } else { "requested" })
+        );
+        let y = file.at(short.time);
+        let reached = match limit {
+            "speed" => y.speed.abs(),
+            "acceleration" => y.acceleration.abs(),
+            _ => short.needed,
+        };
+        assert!((reached - short.needed).abs() < 1e-9 * reached, "{limit}: {reached} {}", short.needed);
+    };
+    let most =
+        |of: &dyn Fn(f64) -> f64| (0..4000).map(|k| of(file.end() * f64::from(k) / 4e3).abs()).fold(0.0, f64::max);
+    let [speed, acceleration] = [most(&|t| file.at(t).speed), most(&|t| file.at(t).acceleration)];
+    beyond(Wanted { speed: Some(0.4 * speed), ..FREE }, "speed");
+    beyond(Wanted { acceleration: Some(0.2 * acceleration), ..FREE }, "acceleration");
+    beyond(Wanted { jerk: Some(acceleration), ..FREE }, "jerk");
+    beyond(Wanted { reserve: 0.85, ..FREE }, "voltage");
+    let own = Wanted { speed: Some(speed * 1.001), acceleration: Some(acceleration * 1.001), ..FREE };
+    assert_eq!(own.exceeded_by(&case.moves[0].profiles), []);
+}
+
 /// A gantry in closed loop with feed-forward, its square as `motion` says.
 fn gantry(kind: &str, motion: &str) -> Case {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages").join(kind).join("square.toml");

@@ -257,6 +257,8 @@ pub struct Measurement {
     pub warnings: Vec<String>,
     /// Stiffness, damping and delay, or the reason for a missing fit.
     pub fit: Result<FrfFit>,
+    /// True if the model does not describe responses that suffice for a fit.
+    pub is_astray: bool,
 }
 
 impl Known {
@@ -291,9 +293,18 @@ pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
     let (frfs, mut warnings) = estimate_all(machine.kind, &logs, cut)?;
     let kinematic: Vec<Frf> = frfs.iter().filter(|frf| is_kinematic(frf.quantity)).cloned().collect();
     let fit = fit(machine, &known, &kinematic);
+    let mut is_astray = false;
+    if let Err(error) = &fit
+        && fit::can_be_fitted(machine, &kinematic)
+    {
+        is_astray = true;
+        let next = error.next.iter().map(|next| format!(": {next}")).collect::<String>();
+        warnings.push(format!("{}{next}", error.what));
+    }
     if let Ok(fit) = &fit
         && fit.is_far()
     {
+        is_astray = true;
         warnings.push(format!(
             "the fitted responses miss the measured ones by {:.3} times what noise explains, so the intervals are not to be \
              relied on: check `hold` of the log, its delay, and what the model lacks",
@@ -312,7 +323,7 @@ pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
             margins: margins_of(case, frf, &frfs, fit.as_ref().ok()),
         });
     }
-    Ok(Measurement { known, responses, warnings, fit })
+    Ok(Measurement { known, responses, warnings, fit, is_astray })
 }
 
 /// True if a quantity is a position or a speed.

@@ -5,8 +5,8 @@ use crate::case::{Case, Files, Move};
 use crate::control::{Setup, closed_loop};
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
+use crate::machine::{Machine, SlideForces};
 use crate::metrics::Peak;
 use crate::reach::feasible::{Load, Shortfall, limits, loads, loads_of_run, shortfalls_of_run, without_reserve};
 use crate::reach::quickest::{CLOSELY, INSTANTS, MovePath, Quickest, Share, Wanted, modes};
@@ -92,7 +92,8 @@ pub struct Planned {
     /// Use of each limit of the machine, worst case over the references on the family and the run on the machine of the
     /// file.
     pub loads: Vec<Load>,
-    /// Minimum time of the rigid axis within voltage and current, s; none if nothing limits it, or with several drives.
+    /// Minimum time of the rigid axis within voltage and current, s; none if nothing limits it, with several drives, or
+    /// with forces that depend on position or speed.
     pub bound: Option<f64>,
     /// All tried plans, in order.
     pub tried: Vec<Tried>,
@@ -440,9 +441,12 @@ impl Planner<'_> {
         Ok((arrival, ran))
     }
 
-    /// Minimum time of all legs of the rigid axis, with their rests.
+    /// Minimum time of all legs of the rigid axis, with their rests; none with forces that depend on position or speed.
     fn bound(&self, way: &MovePath) -> Option<f64> {
         let [mut from] = way.start[..] else { return None };
+        if self.family.machine.cart.forces != SlideForces::default() {
+            return None;
+        }
         let limits = limits(&self.family.machine, self.design.bounds());
         let rigid = Rigid::new(&self.family.machine);
         let mut time = 0.0;

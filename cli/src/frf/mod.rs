@@ -8,7 +8,7 @@ use crate::failure::{Outcome, Status};
 use crate::folder::{self, Folder};
 use std::f64::consts::PI;
 use std::fmt::Write;
-use taut::frf::{Cut, FrfFit, Known, Measurement, measure};
+use taut::frf::{Cut, Known, Measurement, measure};
 use taut::json;
 use taut_report::frf::{figures, page};
 
@@ -24,7 +24,7 @@ pub fn run(args: &Args) -> Outcome {
     let data = json::text(&json::frf(&case, &found));
     let advice = "add --out DIR for the responses as a table and a report";
     let mut finished = Finished::new("frf", ("frf.json", data), table::text(&case.title, &found), advice);
-    if found.fit.as_ref().is_ok_and(FrfFit::is_far) {
+    if found.is_astray {
         finished.status = Status::Incomplete;
     }
     finished.remarks.extend(found.warnings.iter().cloned().map(Remark::Warning));

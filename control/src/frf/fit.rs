@@ -291,13 +291,22 @@ fn is_used(point: &Point) -> bool {
     point.deviation > 0.0 && Frf::is_coherent(point)
 }
 
+fn used(frfs: &[Frf]) -> usize {
+    frfs.iter().map(|frf| frf.points.iter().filter(|point| is_used(point)).count()).sum()
+}
+
+/// True if these responses and this machine admit a fit, whatever its result.
+pub(super) fn can_be_fitted(machine: &Machine, frfs: &[Frf]) -> bool {
+    machine.belt.model != BeltModel::Rigid && used(frfs) >= FEWEST
+}
+
 /// Fits the belt and the delay of a machine to frequency responses.
 pub fn fit(machine: &Machine, known: &Known, frfs: &[Frf]) -> Result<FrfFit> {
     if machine.belt.model == BeltModel::Rigid {
         return Err(Error::new("a rigid belt has no stiffness to be fitted").next("give belt.model = \"elastic\""));
     }
     let problem = Problem { machine, known, frfs };
-    let points: usize = frfs.iter().map(|frf| frf.points.iter().filter(|point| is_used(point)).count()).sum();
+    let points = used(frfs);
     if points < FEWEST {
         return Err(Error::new(format!("{points} points with a coherence of at least {}", super::COHERENT))
             .allowed(format!("at least {FEWEST}"))
