@@ -162,7 +162,7 @@ await test("shows the bits of the program for 100 random machines", async open =
   let exact = 0,
     printedToo = 0;
   for (let drawn = 0; exact < 100; drawn++) {
-    expect(drawn < 200, `of ${drawn} machines only ${exact} could be compared`);
+    expect(drawn < 300, `of ${drawn} machines only ${exact} could be compared`);
     const place = Math.floor(stages.length * random()),
       {parameters, experiments} = described[place];
     const changed = ({key, value}) => [key, value * 10 ** (0.5 * (random() - 0.5))];
