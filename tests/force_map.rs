@@ -152,6 +152,27 @@ fn the_largest_sine_is_named_first() {
     }
 }
 
+/// `taut move` writes the end of a move that is no multiple of the interval as a last row; such logs were refused.
+#[test]
+fn a_last_row_off_the_grid_is_left_out() {
+    let plain = case(&[]);
+    let truth = with_force(&plain, [0.3, 1.0]);
+    let rows = moved(&plain, &truth, "slow", ["time", "drive_angle", "voltage"]);
+    let even = map(&logged(&plain, log(&plain, rows.clone(), 0.0, 1))).unwrap();
+    let mut log = log(&plain, rows, 0.0, 1);
+    let last = |values: &[f64]| *values.last().unwrap();
+    let (time, angle, voltage) = (last(&log.time), last(&log.outputs[0].values), last(&log.inputs[0]));
+    log.time.push(time + 0.4e-3);
+    log.outputs[0].values.push(angle);
+    log.inputs[0].push(voltage);
+    let found = map(&logged(&plain, log.clone())).unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(found.points, even.points);
+    // Within the log, an uneven row is refused.
+    let middle = log.time.len() / 2;
+    log.time[middle] += 0.4e-3;
+    assert!(map(&logged(&plain, log)).unwrap_err().to_string().contains("evenly"));
+}
+
 /// Sines of 8.55, 4.39 and 4.35 N that nearly cancel were named in a map of 1 N: a sine per turn, and one that the
 /// points of the map just resolve.
 #[test]

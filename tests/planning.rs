@@ -252,22 +252,29 @@ fn limits_of_the_file_beyond_those_of_the_user_are_not_kept() {
                 && short.words.contains(if limit == "voltage" { "reserve" } else { "requested" })
         );
         let y = file.at(short.time);
-        let reached = match limit {
-            "speed" => y.speed.abs(),
-            "acceleration" => y.acceleration.abs(),
-            _ => short.needed,
-        };
+        let reached = if limit == "speed" { y.speed.abs() } else { short.needed };
         assert!((reached - short.needed).abs() < 1e-9 * reached, "{limit}: {reached} {}", short.needed);
     };
     let most =
         |of: &dyn Fn(f64) -> f64| (0..4000).map(|k| of(file.end() * f64::from(k) / 4e3).abs()).fold(0.0, f64::max);
     let [speed, acceleration] = [most(&|t| file.at(t).speed), most(&|t| file.at(t).acceleration)];
-    beyond(Wanted { speed: Some(0.4 * speed), ..FREE }, "speed");
-    beyond(Wanted { acceleration: Some(0.2 * acceleration), ..FREE }, "acceleration");
-    beyond(Wanted { jerk: Some(acceleration), ..FREE }, "jerk");
+    let slow = Wanted { speed: Some(0.4 * speed), acceleration: Some(0.2 * acceleration), ..FREE };
+    beyond(slow, "speed");
     beyond(Wanted { reserve: 0.85, ..FREE }, "voltage");
+    let words = Wanted { jerk: Some(acceleration), ..slow }.exceeded_by(&case.moves[0].profiles);
+    assert_eq!(words.iter().map(|short| short.limit).collect::<Vec<_>>(), ["speed", "acceleration", "jerk"]);
     let own = Wanted { speed: Some(speed * 1.001), acceleration: Some(acceleration * 1.001), ..FREE };
     assert_eq!(own.exceeded_by(&case.moves[0].profiles), []);
+}
+
+/// The reason was that the limits leave none, without the limit or a number.
+#[test]
+fn a_reserve_that_leaves_no_plan_is_named_with_what_is_needed() {
+    for load in ["-38 N", "38 N"] {
+        let case = case(&[&format!("cart.load={load}"), "tune.spread=0", "tune.places=1"]);
+        let error = plan(&case, &[0], &FREE, &|| false).unwrap_err().to_string();
+        assert!(error.contains("; the reserve leaves 21.6") && error.contains("needs 2"), "{load}: {error}");
+    }
 }
 
 /// A gantry in closed loop with feed-forward, its square as `motion` says.

@@ -8,8 +8,10 @@ use crate::error::{Error, Result};
 use crate::machine::rigid::Rigid;
 use crate::machine::{Machine, SlideForces};
 use crate::metrics::Peak;
-use crate::reach::feasible::{Load, Shortfall, limits, loads, loads_of_run, shortfalls_of_run, without_reserve};
-use crate::reach::quickest::{CLOSELY, INSTANTS, MovePath, Quickest, Share, Wanted, modes};
+use crate::reach::feasible::{
+    Load, Shortfall, limits, loads, loads_of_run, shortfalls, shortfalls_of_run, without_reserve,
+};
+use crate::reach::quickest::{CLOSELY, INSTANTS, MovePath, Quickest, SLOW, Share, Wanted, modes};
 use crate::signal::profile::{Leg, Limits, Profile};
 use crate::solve::{Ending, Solver};
 use crate::tune::Family;
@@ -215,7 +217,8 @@ impl Planner<'_> {
         let search = Search { quickest, way, motion };
         let (mut tried, refused) = self.tried(&search)?;
         if tried.is_empty() {
-            return Err(impossible(match refused {
+            let short = refused.or_else(|| self.short_of_reserve(&search.way));
+            return Err(impossible(match short {
                 Some(short) => short.words,
                 None => "after the reserve, the limits of motor and belt leave none on all axes of the family".into(),
             }));
@@ -265,6 +268,19 @@ impl Planner<'_> {
             profiles,
             tried,
         })
+    }
+
+    /// What a slow move lacks: reserve on the machine of the file, or a limit of another machine of the family.
+    fn short_of_reserve(&self, way: &MovePath) -> Option<Shortfall> {
+        let profiles = self.design.shaped(&way.within(&SLOW).ok()?);
+        let bounds = self.design.bounds();
+        let own = without_reserve(&self.family.machine, bounds, &profiles, self.wanted.reserve);
+        let others = self.machines.iter().flat_map(|(machine, _)| shortfalls(machine, bounds, &profiles));
+        let others = others.map(|mut short| {
+            short.words = format!("on an axis of the family, {}", short.words);
+            short
+        });
+        own.into_iter().chain(others).next()
     }
 
     /// Plans for each jerk time and fraction of the limits, with their arrival on the nominal machine, and what a run

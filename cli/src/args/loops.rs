@@ -89,7 +89,7 @@ pub struct Plan {
     #[arg(long, value_name = "JERK", value_parser = jerk)]
     pub jerk: Option<f64>,
     /// Share of voltage and current, or of the pull-out torque of a stepper, that is reserved
-    #[arg(long, value_name = "SHARE", default_value = "10%", value_parser = reserve)]
+    #[arg(long, value_name = "SHARE", default_value = "10%", value_parser = reserve, allow_hyphen_values = true)]
     pub reserve: f64,
     #[command(flatten)]
     pub common: Common,

@@ -152,6 +152,9 @@ pub struct MovePath {
     longest: f64,
 }
 
+/// Limits of a slow move, which requires little more than friction.
+pub const SLOW: Limits = Limits { speed: 1e-3, acceleration: 1e-2, jerk: None, snap: None };
+
 /// Placeholder limits of a leg.
 const ANY: Limits = Limits { speed: 1.0, acceleration: 1.0, jerk: None, snap: None };
 
@@ -212,8 +215,7 @@ pub struct Quickest<'a> {
 impl Quickest<'_> {
     /// Errors: a path that is infeasible at any speed and acceleration, and one that nothing limits.
     pub fn check(&self, way: &MovePath) -> Result<()> {
-        let slow = Limits { speed: 1e-3, acceleration: 1e-2, jerk: None, snap: None };
-        let references = self.design.shaped(&way.within(&slow)?);
+        let references = self.design.shaped(&way.within(&SLOW)?);
         let short = shortfalls(self.machine, self.design.bounds(), &references);
         // A motor that cannot break the axis away needs no word about its voltage.
         let breakaway = short.iter().find(|short| short.limit == "breakaway");

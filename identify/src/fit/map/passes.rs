@@ -70,11 +70,19 @@ impl Pass {
 
 /// The passes of a log; `step` is about the distance of points of the map, m.
 pub(super) fn passes(machine: &Machine, log: &Log, step: f64) -> Result<Vec<Pass>> {
-    let way = way(machine, log)?;
+    let mut way = way(machine, log)?;
+    let interval = |n: usize| (log.time[n - 1] - log.time[0]) / (n.max(2) - 1) as f64;
+    let is_even = |n: usize| {
+        let h = interval(n);
+        log.time[..n].iter().enumerate().all(|(k, t)| (t - log.time[0] - k as f64 * h).abs() < 0.05 * h)
+    };
+    // The last row of a move may be at its end, off the grid of the others.
+    if way.len() > 2 && !is_even(way.len()) && is_even(way.len() - 1) {
+        way.pop();
+    }
     let n = way.len();
-    let h = (log.time[n - 1] - log.time[0]) / (n.max(2) - 1) as f64;
-    let is_even = log.time.iter().enumerate().all(|(k, t)| (t - log.time[0] - k as f64 * h).abs() < 0.05 * h);
-    if !is_even {
+    let h = interval(n);
+    if !is_even(n) {
         return Err(Error::new("its rows are not evenly spaced in time").in_key(log).next("log at a constant rate"));
     }
     let too_short = || {
