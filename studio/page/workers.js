@@ -15,7 +15,8 @@ export class Workers {
   constructor(wire) {
     this.wire = wire;
     this.words = {
-      gone: "The module of this page cannot be loaded. Load the page again; its folder needs taut.wasm and worker.js.",
+      gone: "The module of this page cannot be loaded. Load the page again; its folder needs "
+        + "taut.wasm and worker.js, and the browser vectors in modules (Chrome 91, Firefox 89, Safari 16.4 or later).",
       link: "The address of this page holds this state now: whoever opens it sees the same.",
       loading: "Loading the module that computes…",
       logs: "CSV or MATLAB",

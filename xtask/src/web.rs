@@ -57,8 +57,10 @@ fn module(compiler: &Compiler) -> Result<PathBuf, String> {
     let target = build_folder();
     let mut build = crate::cargo(&["build", "--locked", "--profile", "web", "--package", "taut-web", "--lib"]);
     build.args(["--target", TARGET, "--target-dir"]).arg(&target);
-    // Paths of the machine that builds it do not belong in a published file.
-    build.env("CARGO_ENCODED_RUSTFLAGS", package::flags(Path::new("."))?.join("\u{1f}"));
+    // Paths of the machine that builds it do not belong in a published file. All browsers have vectors since Safari 16.4.
+    let mut flags = package::flags(Path::new("."))?;
+    flags.push("-Ctarget-feature=+simd128".into());
+    build.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"));
     compiler.set(&mut build)?;
     if matches!(compiler, Compiler::Debian(_)) {
         build.env("CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER", linker()?);
