@@ -58,11 +58,11 @@ fn what_cannot_be_learned_is_told() {
         (vec!["learn", SHAPED, "--log", &log], 2, "the case has 3 moves, and a log is of one"),
         (vec!["learn", SHAPED, "--move", "gone", "--log", &log], 2, "gone"),
         (vec!["learn", SHAPED, "--move", "short fast", "--log", &gone], 2, "there is no such file"),
-        (vec!["learn", SHAPED, "--move", "short fast", "--log", &short], 1, "the log ends at"),
+        (vec!["learn", SHAPED, "--move", "short fast", "--log", &short], 2, "short.csv: the log ends at"),
         ([&usual[..], &["--position", "nowhere"]].concat(), 2, "nowhere"),
         ([&usual[..], &["--unit", "V"]].concat(), 2, "a unit of length is needed"),
         ([&usual[..], &["--added", &log]].concat(), 2, "added_V"),
-        ([&usual[..], &["--set", "controller.pid.proportional=300 V/mm"]].concat(), 1, "the loop is not stable"),
+        ([&usual[..], &["--set", "controller.pid.proportional=300 V/mm"]].concat(), 1, "pid-shaped.toml: the loop is not stable"),
         (square.to_vec(), 2, "bridge_position_m"),
         (
             [&square[..], &["--position", "cart_position_m"]].concat(),

@@ -40,7 +40,7 @@ use crate::control::Added;
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::{Error, Result};
-use crate::machine::Geometry;
+use crate::machine::{Geometry, Machine};
 use crate::quantity::rounded;
 use crate::tune::{Corner, Family, Peaks, from_commands, inverse, largest, over, smallest};
 use nalgebra::{Complex, SMatrix, SVector};
@@ -288,47 +288,64 @@ fn weighed(signals: &[Vec<f64>], weights: &[f64], n: usize) -> Vec<f64> {
     (0..n).map(|k| signals.iter().zip(weights).map(|(signal, weight)| weight * signal[k]).sum()).collect()
 }
 
+impl Trial {
+    /// Errors: columns, rows or a duration that do not fit this move of this machine.
+    pub fn check(&self, machine: &Machine, motion: &Move, design: &Design) -> Result<()> {
+        self.samples(machine.geometry(), motion, design).map(|_| ())
+    }
+
+    /// Number of the controller's samples that the log covers.
+    fn samples(&self, geometry: &Geometry, motion: &Move, design: &Design) -> Result<usize> {
+        let Trial { time, positions, at } = self;
+        let every = design.every;
+        let wanted = match at {
+            At::Cart => geometry.slides.len(),
+            At::Encoder => geometry.drives.len(),
+        };
+        if positions.len() != wanted {
+            return Err(Error::new(format!("the log has {} columns of positions", positions.len())).allowed(
+                match at {
+                    At::Cart => format!("{wanted}: one for each part that slides"),
+                    At::Encoder => format!("{wanted}: one for the encoder of each drive"),
+                },
+            ));
+        }
+        let (Some(&first), Some(&last)) = (time.first(), time.last()) else {
+            return Err(Error::new("the log has no rows"));
+        };
+        let is_whole = |position: &Vec<f64>| position.len() == time.len() && position.iter().all(|x| x.is_finite());
+        if time.iter().any(|value| !value.is_finite()) || !positions.iter().all(is_whole) {
+            return Err(Error::new("the log has values that are no numbers").next("keep complete rows"));
+        }
+        if first > every {
+            return Err(Error::new(format!("the log begins {} s after the move", rounded(first)))
+                .next("log from the beginning of the move on, with times counted from it"));
+        }
+        let spacing = (last - first) / (time.len().max(2) - 1) as f64;
+        if spacing > COARSEST * every {
+            return Err(Error::new(format!("the rows of the log are {} s apart", rounded(spacing)))
+                .allowed(format!("up to {} s: the controller samples every {every} s", rounded(COARSEST * every)))
+                .next("log at the controller's rate"));
+        }
+        let n = (last.min(motion.until) / every * (1.0 + 1e-12)).floor() as usize + 1;
+        if n > MOST_SAMPLES {
+            return Err(Error::new(format!("the move has {n} samples")).allowed(format!("up to {MOST_SAMPLES}")));
+        }
+        let end = motion.end();
+        if (n as f64) < end / every + LEAST_REST as f64 {
+            return Err(Error::new(format!("the log ends at {} s, and the move at {} s", rounded(last), rounded(end)))
+                .allowed(format!("a rest of at least {LEAST_REST} samples after the move"))
+                .next("log a little longer, or give the move a longer `until`"));
+        }
+        Ok(n)
+    }
+}
+
 /// Reference minus position of each sliding part at the controller's samples, m.
 fn errors(geometry: &Geometry, motion: &Move, design: &Design, trial: &Trial) -> Result<Vec<Vec<f64>>> {
+    let n = trial.samples(geometry, motion, design)?;
     let Trial { time, positions, at } = trial;
     let every = design.every;
-    let wanted = match at {
-        At::Cart => geometry.slides.len(),
-        At::Encoder => geometry.drives.len(),
-    };
-    if positions.len() != wanted {
-        return Err(Error::new(format!("the log has {} columns of positions", positions.len())).allowed(match at {
-            At::Cart => format!("{wanted}: one for each part that slides"),
-            At::Encoder => format!("{wanted}: one for the encoder of each drive"),
-        }));
-    }
-    let (Some(&first), Some(&last)) = (time.first(), time.last()) else {
-        return Err(Error::new("the log has no rows"));
-    };
-    let is_whole = |position: &Vec<f64>| position.len() == time.len() && position.iter().all(|x| x.is_finite());
-    if time.iter().any(|value| !value.is_finite()) || !positions.iter().all(is_whole) {
-        return Err(Error::new("the log has values that are no numbers").next("keep complete rows"));
-    }
-    if first > every {
-        return Err(Error::new(format!("the log begins {} s after the move", rounded(first)))
-            .next("log from the beginning of the move on, with times counted from it"));
-    }
-    let spacing = (last - first) / (time.len().max(2) - 1) as f64;
-    if spacing > COARSEST * every {
-        return Err(Error::new(format!("the rows of the log are {} s apart", rounded(spacing)))
-            .allowed(format!("up to {} s: the controller samples every {every} s", rounded(COARSEST * every)))
-            .next("log at the controller's rate"));
-    }
-    let n = (last.min(motion.until) / every * (1.0 + 1e-12)).floor() as usize + 1;
-    if n > MOST_SAMPLES {
-        return Err(Error::new(format!("the move has {n} samples")).allowed(format!("up to {MOST_SAMPLES}")));
-    }
-    let end = motion.end();
-    if (n as f64) < end / every + LEAST_REST as f64 {
-        return Err(Error::new(format!("the log ends at {} s, and the move at {} s", rounded(last), rounded(end)))
-            .allowed(format!("a rest of at least {LEAST_REST} samples after the move"))
-            .next("log a little longer, or give the move a longer `until`"));
-    }
     let profiles = motion.references(design);
     let one = |slide: usize| -> Vec<f64> {
         let position = |row: usize| match at {

@@ -44,6 +44,7 @@ pub fn run(args: &Args) -> Outcome {
         positions.push(position.into_iter().map(|value| value * args.unit).collect());
     }
     let trial = Trial { time, positions, at };
+    trial.check(&case.machine, motion, &design).map_err(|error| error.in_file(log))?;
     let unit = case.machine.drives[0].amplifier.mode.unit();
     let before = args.added.as_deref().map(|file| folder::read_added(file, &case.machine)).transpose()?;
     let interrupt = Interrupt::listen();
@@ -53,7 +54,7 @@ pub fn run(args: &Args) -> Outcome {
     if let Some(signal) = interrupt.signal() {
         return Err(interrupted(signal, "interrupted before anything was learned; nothing was written"));
     }
-    let found = found.map_err(|error| Failure::work(error.in_file(log)))?;
+    let found = found.map_err(|error| Failure::work(error.in_file(&args.case)))?;
     let data = json::text(&json::learned(&case, motion, at, &found));
     let advice = "add --out DIR for the signal as next.csv and a report";
     let mut finished = Finished::new("learn", ("learn.json", data), table::text(&case, motion, &found), advice);
