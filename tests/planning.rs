@@ -17,7 +17,7 @@ use taut::planning::{Plans, plan};
 use taut::reach::compensation::Compensation;
 use taut::reach::feasible::{limits, loads, shortfalls};
 use taut::reach::quickest::{MovePath, Quickest, Share, Wanted, modes};
-use taut::signal::profile::{Leg, Limits, Profile};
+use taut::signal::profile::{Leg, Limits, Profile, Reference};
 use taut::signal::{Hold, Signal};
 use taut::solve::{Solver, simulate};
 
@@ -370,10 +370,11 @@ fn axes() -> Vec<(String, Case)> {
     ];
     let bundled = bundled.into_iter().map(|name| {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages").join(name);
-        // Without its experiments, whose logs may be missing; one has no limit.
         let text = std::fs::read_to_string(&file).unwrap();
-        let text = &text[..text.find("[[experiment]]").unwrap_or(text.len())];
-        let changes: &[&str] = if name.starts_with("emps") { &["controller.limit=10"] } else { &[] };
+        // It has no limit, and its logs may be missing.
+        let is_logged = name.starts_with("emps");
+        let text = if is_logged { text.split("[[experiment]]").next().unwrap() } else { &text };
+        let changes: &[&str] = if is_logged { &["controller.limit=10"] } else { &[] };
         (name.to_owned(), Case::from_text_with(&file, text, changes).unwrap_or_else(|error| panic!("{error}")))
     });
     let two_mass = case(&["belt.model=two-mass", "motor.gear_efficiency=0.8", "motor.rotor_inertia=1e-5 kg m^2"]);
@@ -396,6 +397,28 @@ fn quickest(case: &Case, distance: f64, periods: [u8; 2], reserve: f64) -> Optio
     Some((limits, profiles))
 }
 
+/// Shortest time of an axis as one mass within these volts and amperes that accelerates and brakes evenly, s.
+fn evenly_accelerated(rigid: &Rigid, distance: f64, [volts, amperes]: [Option<f64>; 2]) -> f64 {
+    let duration = |speed: f64| {
+        let needed = |acceleration: f64| {
+            let (viscous, dry) = rigid.friction(speed, 1.0);
+            let y = Reference { speed, acceleration, ..Reference::default() };
+            let (current, voltage) =
+                rigid.electrical(rigid.mass * acceleration + viscous + dry - rigid.constant, 0.0, &y);
+            [voltage, current]
+        };
+        // Both are linear in the acceleration.
+        let [steady, one] = [0.0, 1.0].map(needed);
+        let most = [volts, amperes]
+            .into_iter()
+            .enumerate()
+            .filter_map(|(k, limit)| Some((limit? - steady[k]) / (one[k] - steady[k])));
+        let a = most.fold(f64::INFINITY, f64::min);
+        if a > 0.0 && speed * speed <= distance * a { distance / speed + speed / a } else { f64::INFINITY }
+    };
+    (0..4000).map(|k| duration(1e-3 * 1.0025_f64.powi(k))).fold(f64::INFINITY, f64::min)
+}
+
 /// There was no plan for strokes above some 0.5 to 1 m, and one tried with a longer search was 50 % too slow; and the
 /// reserve was used for microseconds between the instants at which a plan was checked.
 #[test]
@@ -404,19 +427,28 @@ fn strokes_of_any_length_have_a_plan_near_the_bound_that_keeps_the_limits_at_eve
         let design = case.controller.as_ref().unwrap();
         let compensation = Compensation::new(&case.machine, &FeedForward::NONE);
         let (volts, amperes) = limits(&case.machine, design.bounds());
+        let rigid = Rigid::new(&case.machine);
         let mut last = 0.0;
         for distance in [1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 5.0] {
             let found = quickest(&case, distance, [0, 0], 0.1);
             let Some((found, profiles)) = found else { panic!("{name}: no plan over {distance} m") };
             let end = profiles[0].end();
-            assert!(end > last, "{name}: {distance} m takes {end} s, less than a shorter stroke");
+            assert!(end >= last * (1.0 - 1e-9), "{name}: {distance} m takes {end} s, less than a shorter stroke");
             last = end;
-            // Against the bound within the same limits; the averaging times are those of the controller's samples.
             let left = [volts, amperes].map(|limit| limit.map(|limit| 0.9 * limit));
-            let bound = Rigid::new(&case.machine).quickest(distance, (left[0], left[1]));
+            // The averaging times are those of the controller's samples, of which a short stroke leaves no choice.
             let times = found.acceleration / found.jerk.unwrap() + found.jerk.unwrap() / found.snap.unwrap();
-            if let Some(bound) = bound {
-                println!("{name}: {distance} m in {end:.4} s, bound {bound:.4} s, {:.3}", (end - times) / bound);
+            if let (Some(bound), true) = (rigid.quickest(distance, (left[0], left[1])), distance > 2e-3) {
+                let (taken, even) = (end - times, evenly_accelerated(&rigid, distance, left));
+                println!(
+                    "{name}: {distance} m, {end:.4} s: {:.3} of even acceleration, {:.3} of the bound",
+                    taken / even,
+                    taken / bound
+                );
+                assert!(
+                    taken < 1.2 * even && taken < 1.5 * bound,
+                    "{name}: {distance} m: {taken} s, {even} s, {bound} s"
+                );
             }
             // Every instant, by the equations instead of the search's.
             let shaped = design.shaped(&profiles);

@@ -17,8 +17,8 @@ use crate::solve::{Ending, Solver};
 use crate::tune::Family;
 use std::path::Path;
 
-/// Jerk times in periods of the belt's lowest mode, and snap times in periods of its next; 0 is a few samples. Over long
-/// strokes, many periods leave the voltage to a high speed.
+/// Jerk times in periods of the belt's lowest mode, and snap times in periods of its next; 0 is a few samples. Over a
+/// long stroke, a long jerk time lets the acceleration fall while the speed uses up the voltage.
 const PERIODS: [[u8; 2]; 7] = [[0, 0], [1, 0], [2, 0], [3, 0], [6, 0], [10, 0], [1, 1]];
 
 /// Fractions of the limits that plans use, the quickest first.
