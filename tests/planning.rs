@@ -55,7 +55,7 @@ fn plans_keep_the_limits_and_arrive_sooner() {
             assert_eq!(short, [], "{seed}");
             // The reserve is left.
             for load in loads(&case.machine, design.bounds(), &planned.profiles) {
-                assert!(load.needed <= 0.905 * load.allowed, "{seed}: {load:?}");
+                assert!(load.needed <= 0.9 * (1.0 + 1e-6) * load.allowed, "{seed}: {load:?}");
             }
             let [sooner, later] = [&best.arrival, given].map(|arrival| arrival.worst.unwrap_or(f64::INFINITY));
             assert!(planned.is_kept || sooner < later, "{seed}: {sooner} {later}");
