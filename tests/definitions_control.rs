@@ -6,6 +6,7 @@ use document::Pcg;
 use std::f64::consts::PI;
 use taut::case::{Case, TEMPLATE};
 use taut::control::{Controller, Observation, Standard};
+use taut::machine::BeltModel;
 use taut::signal::profile::Reference;
 
 const AXIS: [&str; 8] = [
@@ -33,12 +34,23 @@ struct Made {
 }
 
 /// The controller of the library beside that of the document, on samples drawn by chance.
-fn compare(controller: &str, mut made: Made, around: impl Fn(&Case, &Reference) -> [f64; 2], target: bool) {
+fn compare(controller: &str, made: Made, around: impl Fn(&Case, &Reference) -> [f64; 2], target: bool) {
+    compare_on(&AXIS, controller, made, around, target);
+}
+
+/// The same on another axis.
+fn compare_on(
+    axis: &[&str],
+    controller: &str,
+    mut made: Made,
+    around: impl Fn(&Case, &Reference) -> [f64; 2],
+    target: bool,
+) {
     let text = format!(
         "{TEMPLATE}\n[controller]\nevery = {T}\nlimit = {LIMIT}\n{controller}\n\
          [[move]]\nname = \"m\"\nto = 0.01\nspeed = 0.3\nacceleration = 5\nuntil = 1\n"
     );
-    let case = Case::from_text_with("axis.toml", &text, &AXIS).unwrap_or_else(|error| panic!("{error}"));
+    let case = Case::from_text_with("axis.toml", &text, axis).unwrap_or_else(|error| panic!("{error}"));
     let mut ours = Standard::new(case.controller.as_ref().unwrap(), &case.machine).unwrap();
     ours.reset();
     let mut random = Pcg::new(5);
@@ -131,6 +143,8 @@ fn pid_is_that_of_the_document() {
     let stretched = |case: &Case, y: &Reference| [elastic_command(case, y), 0.0];
     let elastic = "feed_forward = { model = \"elastic\", inertia = 0.9, friction = 0.7, compensate_stretch = true }";
     compare(&format!("{pid}\n{elastic}"), made(), stretched, true);
+    let two_mass = [&AXIS[..], &["belt.model=two-mass"]].concat();
+    compare_on(&two_mass, &format!("{pid}\n{elastic}"), made(), stretched, true);
 }
 
 #[test]
@@ -324,7 +338,7 @@ fn rigid_command(case: &Case, y: &Reference) -> f64 {
     command(case, force, 0.9 * one.mass * y.jerk, y)
 }
 
-/// y₁ with two derivatives, and F and Ḟ with all of inertia and friction.
+/// y₁ with its derivatives, and F and Ḟ with all of inertia and friction.
 fn elastic(case: &Case, y: &Reference) -> (Reference, f64, f64) {
     let machine = &case.machine;
     let (r, n, s) = (machine.pulley_radius, machine.drives[0].motor.gear_ratio, sign(y));
@@ -339,21 +353,27 @@ fn elastic(case: &Case, y: &Reference) -> (Reference, f64, f64) {
         m * y.jerk + cart.viscous * y.acceleration,
         m * y.snap + cart.viscous * y.jerk,
     ];
-    let pull = [
-        (j2 * y.acceleration / r + idler.viscous * y.speed / r + s * idler.coulomb) / r,
-        (j2 * y.jerk + idler.viscous * y.acceleration) / (r * r),
-        (j2 * y.snap + idler.viscous * y.jerk) / (r * r),
-    ];
+    let pull = |y: &Reference| {
+        [
+            (j2 * y.acceleration / r + idler.viscous * y.speed / r + s * idler.coulomb) / r,
+            (j2 * y.jerk + idler.viscous * y.acceleration) / (r * r),
+            (j2 * y.snap + idler.viscous * y.jerk) / (r * r),
+        ]
+    };
     let k = k1 + k2 * k3 / (k2 + k3);
-    let stretch = |d: usize| (load[d] + pull[d] * k2 / (k2 + k3)) / k;
+    let is_two_mass = machine.belt.model == BeltModel::TwoMass;
+    let share = if is_two_mass { 0.0 } else { k2 / (k2 + k3) };
+    let stretch = |d: usize| (load[d] + pull(y)[d] * share) / k;
     let first = Reference {
         position: y.position + stretch(0),
         speed: y.speed + stretch(1),
         acceleration: y.acceleration + stretch(2),
+        jerk: y.jerk + if is_two_mass { cart.viscous * y.snap / k } else { 0.0 },
         ..*y
     };
+    let pull = pull(if is_two_mass { &first } else { y });
     let own = j1 * first.acceleration / (r * r) + drive.viscous * first.speed / (r * r) + s * drive.coulomb / r;
-    let rate = j1 * y.jerk / (r * r) + drive.viscous * first.acceleration / (r * r) + load[1] + pull[1];
+    let rate = j1 * first.jerk / (r * r) + drive.viscous * first.acceleration / (r * r) + load[1] + pull[1];
     (first, own + load[0] + pull[0], rate)
 }
 

@@ -5,6 +5,7 @@ use rand_pcg::Pcg64;
 use std::path::Path;
 use taut::case::Case;
 use taut::control::{MoveRun, Setup, closed_loop};
+use taut::design::FeedForward;
 use taut::friction::Motion;
 use taut::machine::BeltModel;
 use taut::machine::Machine;
@@ -13,10 +14,10 @@ use taut::machine::rigid::Rigid;
 use taut::mechanism::What;
 use taut::plan::Experiment;
 use taut::planning::{Plans, plan};
-use taut::reach::feasible::{loads, shortfalls};
-use taut::reach::quickest::Wanted;
-use taut::signal::profile::Leg;
-use taut::signal::profile::Profile;
+use taut::reach::compensation::Compensation;
+use taut::reach::feasible::{limits, loads, shortfalls};
+use taut::reach::quickest::{MovePath, Quickest, Share, Wanted, modes};
+use taut::signal::profile::{Leg, Limits, Profile, Reference};
 use taut::signal::{Hold, Signal};
 use taut::solve::{Solver, simulate};
 
@@ -53,8 +54,8 @@ fn plans_keep_the_limits_and_arrive_sooner() {
             let short = shortfalls(&case.machine, design.bounds(), &planned.profiles);
             assert_eq!(short, [], "{seed}");
             // The reserve is left.
-            for load in loads(&case.machine, design.bounds(), &planned.profiles, 4000) {
-                assert!(load.needed <= 0.905 * load.allowed, "{seed}: {load:?}");
+            for load in loads(&case.machine, design.bounds(), &planned.profiles) {
+                assert!(load.needed <= 0.9 * (1.0 + 1e-6) * load.allowed, "{seed}: {load:?}");
             }
             let [sooner, later] = [&best.arrival, given].map(|arrival| arrival.worst.unwrap_or(f64::INFINITY));
             assert!(planned.is_kept || sooner < later, "{seed}: {sooner} {later}");
@@ -298,7 +299,7 @@ fn a_path_is_planned_within_the_limits_of_all_motors() {
         println!("{kind}: {:?} {:?} {:?}", planned.best, planned.given, plans.modes);
         assert_eq!(shortfalls(&case.machine, design.bounds(), &planned.profiles), []);
         let most = |case: &Case, profiles: &[Profile]| {
-            let loads = loads(&case.machine, design.bounds(), profiles, 4000);
+            let loads = loads(&case.machine, design.bounds(), profiles);
             loads.iter().map(|load| load.share()).fold(0.0, f64::max)
         };
         assert!(most(&case, &planned.profiles) <= 0.9 + 1e-9);
@@ -345,7 +346,7 @@ fn a_move_of_the_file_may_be_a_plan() {
     for case in [&slow, &fast] {
         let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
         assert!(motion.is_planned && motion.profile().target() == 0.04);
-        let loads = loads(&case.machine, design.bounds(), &motion.profiles, 4000);
+        let loads = loads(&case.machine, design.bounds(), &motion.profiles);
         let most = loads.iter().map(|load| load.share()).fold(0.0, f64::max);
         assert!(most <= 0.9 + 1e-9, "{most}");
         // Peak of jerk, from the pieces of the reference.
@@ -354,6 +355,114 @@ fn a_move_of_the_file_may_be_a_plan() {
         assert!(jerk <= 900.0 * (1.0 + 1e-9) && (most > 0.85 || jerk > 890.0), "{most}, {jerk} m/s^3");
     }
     assert!(fast.moves[0].profile().end() < slow.moves[0].profile().end());
+}
+
+/// Bundled axes with a controller, and drawn ones.
+fn axes() -> Vec<(String, Case)> {
+    let bundled = [
+        "sollmann-jouaneh/controllers/pid.toml",
+        "sollmann-jouaneh/controllers/pid-elastic.toml",
+        "sollmann-jouaneh/controllers/pid-shaped.toml",
+        "sollmann-jouaneh/controllers/cascade-current.toml",
+        "sollmann-jouaneh/two-sensors/cascade.toml",
+        "emps/closed.toml",
+        "stepper-axis/stepper-axis.toml",
+    ];
+    let bundled = bundled.into_iter().map(|name| {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages").join(name);
+        let text = std::fs::read_to_string(&file).unwrap();
+        // It has no limit, and its logs may be missing.
+        let is_logged = name.starts_with("emps");
+        let text = if is_logged { text.split("[[experiment]]").next().unwrap() } else { &text };
+        let changes: &[&str] = if is_logged { &["controller.limit=10"] } else { &[] };
+        (name.to_owned(), Case::from_text_with(&file, text, changes).unwrap_or_else(|error| panic!("{error}")))
+    });
+    let two_mass = case(&["belt.model=two-mass", "motor.gear_efficiency=0.8", "motor.rotor_inertia=1e-5 kg m^2"]);
+    let drawn = (40..44).map(|seed| (format!("drawn {seed}"), drawn(seed)));
+    bundled.chain([("two-mass".to_owned(), two_mass)]).chain(drawn).collect()
+}
+
+/// Limits of the quickest move over this distance with these periods, on an axis without limits of its travel.
+fn quickest(case: &Case, distance: f64, periods: [u8; 2], reserve: f64) -> Option<(Limits, Vec<Profile>)> {
+    let mut machine = case.machine.clone();
+    machine.cart.travel = None;
+    let (design, modes) = (case.controller.as_ref().unwrap(), modes(&machine));
+    let any = Limits { speed: 1.0, acceleration: 1.0, jerk: None, snap: None };
+    let way = MovePath::new(&[Profile::new(0.0, &[Leg::To(distance, any)]).unwrap()]).unwrap();
+    let wanted = Wanted { reserve, ..FREE };
+    let quickest = Quickest { machine: &machine, design, modes: &modes, wanted: &wanted };
+    quickest.check(&way).unwrap_or_else(|error| panic!("{distance} m: {error}"));
+    let limits = quickest.limits_for(&way, periods, Share::ALL, &|_| Vec::new()).unwrap()?;
+    let profiles = way.within(&limits).unwrap();
+    Some((limits, profiles))
+}
+
+/// Shortest time of an axis as one mass within these volts and amperes that accelerates and brakes evenly, s.
+fn evenly_accelerated(rigid: &Rigid, distance: f64, [volts, amperes]: [Option<f64>; 2]) -> f64 {
+    let duration = |speed: f64| {
+        let needed = |acceleration: f64| {
+            let (viscous, dry) = rigid.friction(speed, 1.0);
+            let y = Reference { speed, acceleration, ..Reference::default() };
+            let (current, voltage) =
+                rigid.electrical(rigid.mass * acceleration + viscous + dry - rigid.constant, 0.0, &y);
+            [voltage, current]
+        };
+        // Both are linear in the acceleration.
+        let [steady, one] = [0.0, 1.0].map(needed);
+        let most = [volts, amperes]
+            .into_iter()
+            .enumerate()
+            .filter_map(|(k, limit)| Some((limit? - steady[k]) / (one[k] - steady[k])));
+        let a = most.fold(f64::INFINITY, f64::min);
+        if a > 0.0 && speed * speed <= distance * a { distance / speed + speed / a } else { f64::INFINITY }
+    };
+    (0..4000).map(|k| duration(1e-3 * 1.0025_f64.powi(k))).fold(f64::INFINITY, f64::min)
+}
+
+/// There was no plan for strokes above some 0.5 to 1 m, and one tried with a longer search was 50 % too slow; and the
+/// reserve was used for microseconds between the instants at which a plan was checked.
+#[test]
+fn strokes_of_any_length_have_a_plan_near_the_bound_that_keeps_the_limits_at_every_instant() {
+    for (name, case) in axes() {
+        let design = case.controller.as_ref().unwrap();
+        let compensation = Compensation::new(&case.machine, &FeedForward::NONE);
+        let (volts, amperes) = limits(&case.machine, design.bounds());
+        let rigid = Rigid::new(&case.machine);
+        let mut last = 0.0;
+        for distance in [1e-3, 3e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 5.0] {
+            let found = quickest(&case, distance, [0, 0], 0.1);
+            let Some((found, profiles)) = found else { panic!("{name}: no plan over {distance} m") };
+            let end = profiles[0].end();
+            assert!(end >= last * (1.0 - 1e-9), "{name}: {distance} m takes {end} s, less than a shorter stroke");
+            last = end;
+            let left = [volts, amperes].map(|limit| limit.map(|limit| 0.9 * limit));
+            // The averaging times are those of the controller's samples, of which a short stroke leaves no choice.
+            let times = found.acceleration / found.jerk.unwrap() + found.jerk.unwrap() / found.snap.unwrap();
+            if let (Some(bound), true) = (rigid.quickest(distance, (left[0], left[1])), distance > 2e-3) {
+                let (taken, even) = (end - times, evenly_accelerated(&rigid, distance, left));
+                println!(
+                    "{name}: {distance} m, {end:.4} s: {:.3} of even acceleration, {:.3} of the bound",
+                    taken / even,
+                    taken / bound
+                );
+                assert!(
+                    taken < 1.2 * even && taken < 1.5 * bound,
+                    "{name}: {distance} m: {taken} s, {even} s, {bound} s"
+                );
+            }
+            // Every instant, by the equations instead of the search's.
+            let shaped = design.shaped(&profiles);
+            let (rest, mut most) = (shaped[0].rest(), 0.0_f64);
+            for k in 0..=100_000 {
+                let y = shaped[0].at(rest * f64::from(k) / 1e5);
+                let needed = compensation.needed(&y);
+                let (current, voltage) = compensation.rigid.electrical(needed.force[0], needed.force[1], &needed.drive);
+                let shares = [left[0].map(|most| voltage.abs() / most), left[1].map(|most| current.abs() / most)];
+                most = shares.into_iter().flatten().fold(most, f64::max);
+            }
+            assert!(most <= 1.0 + 1e-6, "{name}: {distance} m uses {most} of what the reserve leaves");
+        }
+    }
 }
 
 /// Time from rest to rest of the axis under full voltage, then full braking, by the exact solver: the switch is sought

@@ -6,6 +6,7 @@ use std::path::Path;
 use taut::case::Case;
 use taut::control::{Setup, closed_loop};
 use taut::design::{Bounds, FeedForward, FeedForwardModel};
+use taut::friction::Friction;
 use taut::machine::axis::{CART, DRIVE, IDLER};
 use taut::machine::rigid::{REST_ACCELERATION, REST_SPEED, Rigid};
 use taut::machine::{AmplifierMode, BeltModel, Machine, Travel};
@@ -14,8 +15,8 @@ use taut::number::engineering;
 use taut::polyline::Polyline;
 use taut::reach::compensation::{Compensation, direction};
 use taut::reach::feasible::{loads, shortfalls};
-use taut::signal::Signal;
-use taut::signal::profile::{Profile, Reference};
+use taut::signal::profile::{Leg, Limits, Profile, Reference};
+use taut::signal::{Hold, Signal};
 use taut::solve::{Solver, simulate};
 use taut_core::calculator::Evaluation;
 
@@ -31,7 +32,7 @@ fn needed(machine: &Machine, profile: &Profile, limit: &str) -> f64 {
     (amplifier.voltage_limit, amplifier.current_limit) = (Some(1e9), Some(1e9));
     machine.belt.sheet.allowed_tension = Some(1e9);
     machine.belt.pretension = Some(0.0);
-    loads(&machine, Bounds::default(), std::slice::from_ref(profile), 4000)
+    loads(&machine, Bounds::default(), std::slice::from_ref(profile))
         .iter()
         .find(|load| load.limit == limit)
         .unwrap()
@@ -80,7 +81,7 @@ fn a_force_along_the_travel_is_needed_once() {
             for limit in ["voltage", "current"] {
                 let [is, wanted] = [&along, &loaded].map(|machine| needed(machine, motion.profile(), limit));
                 let without = needed(&case.machine, motion.profile(), limit);
-                assert!((is / wanted - 1.0).abs() < 1e-12, "{}: {limit} {is}, {wanted} with a load", motion.name);
+                assert!((is / wanted - 1.0).abs() < 1e-9, "{}: {limit} {is}, {wanted} with a load", motion.name);
                 assert!((is / without - 1.0).abs() > 1e-3, "{}: {limit} {is}, {without} without", motion.name);
             }
         }
@@ -237,4 +238,112 @@ fn a_gear_with_losses_needs_what_the_solver_says() {
         if (force - rigid.rotor * acceleration) * speed > 0.0 { driving += 1 } else { driven += 1 }
     }
     assert!(driving > 50 && driven > 50, "{driving} {driven}");
+}
+
+/// Two masses on a belt, drawn, without belt damping, and with dry friction or without.
+fn two_masses(chance: &mut Chance, is_dry: bool) -> Machine {
+    let mut draw = |low: f64, high: f64| low * (high / low).powf(chance.uniform());
+    let mut machine = common::table4();
+    machine.belt.model = BeltModel::TwoMass;
+    machine.belt.stiffness = [draw(2e3, 5e4), draw(2e3, 5e4), draw(2e3, 5e4)].into();
+    machine.cart.mass = draw(0.2, 2.0);
+    (machine.drive_pulley.inertia, machine.idler_pulley.inertia) = (draw(2e-5, 4e-4), draw(2e-5, 4e-4));
+    machine.drives[0].motor.gear_ratio = draw(0.5, 4.0);
+    machine.drives[0].motor.rotor_inertia = draw(1e-6, 1e-4);
+    machine.drives[0].amplifier.mode =
+        if draw(1.0, 4.0) > 2.0 { AmplifierMode::Current } else { AmplifierMode::Voltage };
+    let coulomb = if is_dry { [0.01, 0.02, 0.5] } else { [0.0; 3] };
+    machine.drive_pulley.friction = Friction::symmetric(draw(1e-4, 4e-3), coulomb[0]);
+    machine.idler_pulley.friction = Friction::symmetric(draw(1e-4, 4e-3), coulomb[1]);
+    machine.cart.friction = Friction::symmetric(draw(1.0, 40.0), coulomb[2]);
+    machine
+}
+
+/// Largest error of the cart, m, when a machine runs without a controller by the feed-forward of a reference and
+/// `more`, from a state on it; and the largest stretch of its belt, m.
+fn open_loop(
+    machine: &Machine,
+    profile: &Profile,
+    [begin, end]: [f64; 2],
+    more: impl Fn(&Reference) -> f64,
+) -> [f64; 2] {
+    let settings = FeedForward { model: FeedForwardModel::Elastic, ..FeedForward::NONE };
+    let compensation = Compensation::new(machine, &settings);
+    let command = |time: f64| {
+        let y = profile.at(time);
+        compensation.command(&mut Evaluation::plain(), &y).unwrap() + more(&y)
+    };
+    // Straight lines between instants, with two on either side of each jump.
+    let (step, side) = (4e-6, 1e-9);
+    let mut times: Vec<f64> = (0..=((end - begin) / step) as usize).map(|k| begin + step * k as f64).collect();
+    let seams = Profile::seams(std::slice::from_ref(profile));
+    let seams: Vec<f64> = seams.into_iter().filter(|seam| (begin..end).contains(seam)).collect();
+    times.retain(|time| seams.iter().all(|seam| (time - seam).abs() > 3.0 * side));
+    times.extend(seams.iter().flat_map(|seam| [seam - side, seam + side]).filter(|time| *time > begin));
+    times.sort_by(f64::total_cmp);
+    times.dedup_by(|next, last| *next - *last < 0.5 * side);
+    let values = times.iter().map(|time| command(*time)).collect();
+    let times = times.into_iter().map(|time| (time - begin).max(0.0)).collect();
+    let input = Signal::Sampled { times, values, hold: Hold::Linear };
+    let mut experiment = common::experiment(input, end - begin);
+    let (first, r) = (profile.at(begin), machine.pulley_radius);
+    let needed = compensation.needed(&first);
+    for (body, position, speed) in [
+        (DRIVE, needed.drive.position / r, needed.drive.speed / r),
+        (CART, first.position, first.speed),
+        (IDLER, needed.idler[0] / r, needed.idler[1] / r),
+    ] {
+        (experiment.initial.position[body], experiment.initial.speed[body]) = (position, speed);
+    }
+    let run = simulate(machine, &experiment, Solver::for_machine(machine)).unwrap();
+    let [rows, cart] = ["time", "cart_position"].map(|name| run.trajectory.get(name).unwrap());
+    let off = rows.iter().zip(cart).map(|(time, x)| (x - profile.at(begin + time).position).abs());
+    let stretch = rows.iter().map(|time| {
+        let y = profile.at(begin + time);
+        (compensation.needed(&y).drive.position - y.position).abs()
+    });
+    [off.fold(0.0, f64::max), stretch.fold(0.0, f64::max)]
+}
+
+/// The idler of a two-mass belt was accelerated like the cart instead of like the drive pulley with which it turns.
+#[test]
+fn the_feed_forward_of_a_two_mass_belt_is_its_exact_inverse() {
+    let mut chance = Chance::new(32);
+    let limits = Limits { speed: 0.3, acceleration: 6.0, jerk: Some(400.0), snap: Some(6e4) };
+    let profile = Profile::new(0.0, &[Leg::To(0.03, limits)]).unwrap();
+    let whole = profile.end();
+    for number in 0..12 {
+        // Dry friction does not change while all bodies move.
+        let is_dry = number % 2 == 1;
+        let machine = two_masses(&mut chance, is_dry);
+        let during = if is_dry { [0.2 * whole, 0.8 * whole] } else { [0.0, whole] };
+        let [off, stretch] = open_loop(&machine, &profile, during, |_| 0.0);
+        // As before: J₂ (y″ − y₁″)/r² too much.
+        let settings = FeedForward { model: FeedForwardModel::Elastic, ..FeedForward::NONE };
+        let compensation = Compensation::new(&machine, &settings);
+        let r = machine.pulley_radius;
+        let [wrong, _] = open_loop(&machine, &profile, during, |y| {
+            let behind = y.acceleration - compensation.needed(y).drive.acceleration;
+            behind * machine.idler_pulley.inertia / (r * r) / compensation.rigid.force_per_command()
+        });
+        println!("{number}: {off:e} m, {wrong:e} m with y'', of a stretch of {stretch:e} m");
+        assert!(off < 2e-9 && off < 2e-5 * stretch, "{number}: {off:e} m, stretch {stretch:e} m\n{machine:?}");
+        assert!(wrong > 20.0 * off, "{number}: {off:e} m, {wrong:e} m");
+    }
+}
+
+/// The same of spans that follow the cart, whose stiffness changes on the way.
+#[test]
+fn the_feed_forward_of_a_two_mass_belt_contains_the_rates_of_its_stiffness() {
+    let mut chance = Chance::new(33);
+    let limits = Limits { speed: 0.3, acceleration: 6.0, jerk: Some(400.0), snap: Some(6e4) };
+    let profile = Profile::new(-0.1, &[Leg::To(-0.07, limits)]).unwrap();
+    for number in 0..3 {
+        let mut machine = common::with_following_spans(two_masses(&mut chance, false));
+        machine.belt.make.as_mut().unwrap().section *= 0.02;
+        machine.belt.stiffness = machine.belt.make.unwrap().stiffness();
+        let [off, stretch] = open_loop(&machine, &profile, [0.0, profile.end()], |_| 0.0);
+        println!("{number}: {off:e} m, of a stretch of {stretch:e} m");
+        assert!(off < 1e-8 && off < 1e-4 * stretch, "{number}: {off:e} m, stretch {stretch:e} m\n{machine:?}");
+    }
 }

@@ -11,14 +11,15 @@ use crate::metrics::Peak;
 use crate::reach::feasible::{
     Load, Shortfall, limits, loads, loads_of_run, shortfalls, shortfalls_of_run, without_reserve,
 };
-use crate::reach::quickest::{CLOSELY, INSTANTS, MovePath, Quickest, SLOW, Share, Wanted, modes};
+use crate::reach::quickest::{MovePath, Quickest, SLOW, Share, Wanted, modes};
 use crate::signal::profile::{Leg, Limits, Profile};
 use crate::solve::{Ending, Solver};
 use crate::tune::Family;
 use std::path::Path;
 
-/// Jerk times in periods of the belt's lowest mode, and snap times in periods of its next; 0 is a few samples.
-const PERIODS: [[u8; 2]; 5] = [[0, 0], [1, 0], [2, 0], [3, 0], [1, 1]];
+/// Jerk times in periods of the belt's lowest mode, and snap times in periods of its next; 0 is a few samples. Over a
+/// long stroke, a long jerk time lets the acceleration fall while the speed uses up the voltage.
+const PERIODS: [[u8; 2]; 7] = [[0, 0], [1, 0], [2, 0], [3, 0], [6, 0], [10, 0], [1, 1]];
 
 /// Fractions of the limits that plans use, the quickest first.
 const SHARES: [f64; 8] = [1.0, 0.85, 0.72, 0.6, 0.5, 0.4, 0.3, 0.2];
@@ -27,9 +28,6 @@ const SHARES: [f64; 8] = [1.0, 0.85, 0.72, 0.6, 0.5, 0.4, 0.3, 0.2];
 /// the limit that the next one aims at.
 const SLOWED: usize = 5;
 const AIMED: f64 = 0.98;
-
-/// Use of a limit from which a reference is evaluated closely.
-const NEAR: f64 = 0.8;
 
 /// Shortest observed time at rest, s, and a time longer than any move, s.
 const WATCHED: f64 = 0.3;
@@ -252,7 +250,7 @@ impl Planner<'_> {
         let used: Vec<Shortfall> = used.into_iter().filter(is_new).collect();
         short.extend(used);
         let is_sooner = short.is_empty() && Tried::rank_of(&given) <= best.rank();
-        let mut loads = self.loads(&self.design.shaped(&profiles), |_| CLOSELY);
+        let mut loads = self.loads(&self.design.shaped(&profiles));
         loads_of_run(machine, &ran.spans).into_iter().for_each(|load| load.join(&mut loads));
         Ok(Planned {
             is_kept: is_sooner,
@@ -315,8 +313,7 @@ impl Planner<'_> {
 
     /// Limits of the quickest move within these fractions of the limits, and within those of the family.
     fn limits(&self, search: &Search, periods: [u8; 2], share: Share) -> Result<Option<Limits>> {
-        let closely = |near: &[Load]| if near.iter().any(|load| load.share() > NEAR) { CLOSELY } else { INSTANTS };
-        search.quickest.limits_for(&search.way, periods, share, &|profiles| self.loads(profiles, closely))
+        search.quickest.limits_for(&search.way, periods, share, &|profiles| self.loads(profiles))
     }
 
     /// The limits of a plan, reduced until its run on this machine keeps the limits of the belt, and that run; or what
@@ -341,7 +338,7 @@ impl Planner<'_> {
             }
             slowed += 1;
             let shaped = self.design.shaped(&profiles);
-            let required = of_belt(&loads(&self.family.machine, self.design.bounds(), &shaped, INSTANTS));
+            let required = of_belt(&loads(&self.family.machine, self.design.bounds(), &shaped));
             let taken = self.run(search.motion, &profiles, &two_sided(machine))?;
             belt = AIMED * required.min(belt) / of_belt(&loads_of_run(&self.family.machine, &taken.spans)).max(1.0);
             limits = match self.limits(search, periods, Share { motor, belt })? {
@@ -377,18 +374,11 @@ impl Planner<'_> {
         Ok((best, slowest))
     }
 
-    /// Largest use of each limit by references with their shaper, over the family, at `closely` of the loads at a few
-    /// instants.
-    fn loads(&self, profiles: &[Profile], closely: impl Fn(&[Load]) -> usize) -> Vec<Load> {
+    /// Largest use of each limit by references with their shaper, over the family.
+    fn loads(&self, profiles: &[Profile]) -> Vec<Load> {
         let mut all: Vec<Load> = Vec::new();
         for (machine, _) in &self.machines {
-            let at = |instants: usize| loads(machine, self.design.bounds(), profiles, instants);
-            let few = at(INSTANTS);
-            let own = match closely(&few) {
-                INSTANTS => few,
-                instants => at(instants),
-            };
-            own.into_iter().for_each(|load| load.join(&mut all));
+            loads(machine, self.design.bounds(), profiles).into_iter().for_each(|load| load.join(&mut all));
         }
         all
     }

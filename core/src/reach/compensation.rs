@@ -28,6 +28,16 @@ pub(super) fn twist<N: Number>(gear: &GearPlay, torque: N, way: N) -> N {
     torque / gear.stiffness + way * (0.5 * gear.backlash)
 }
 
+/// The reference of a part that is ahead of another one's by this, m, with its first and second rate.
+fn ahead<C: Calculator>(c: &mut C, y: &Reference<C::N>, by: [C::N; 3]) -> Reference<C::N> {
+    Reference {
+        position: c.name("drive_position", y.position + by[0]),
+        speed: c.name("drive_speed", y.speed + by[1]),
+        acceleration: c.name("drive_acceleration", y.acceleration + by[2]),
+        ..*y
+    }
+}
+
 /// Feed-forward, and the reference for the encoder's position.
 #[derive(Debug, Clone)]
 pub struct Compensation {
@@ -105,54 +115,76 @@ impl Compensation {
             snap * mass + cart_b * jerk,
         ]
         .map(|load| c.name("load", load));
-        // P = f₂ − f₃ = (J₂ y″/r + B₂ y′/r + τ_c2 sgn y′)/r                      (18)
+        let in_series = c.name("k_in_series", k2 * k3 / (k2 + k3));
+        let k = c.name("k", k1 + in_series);
+        // P = f₂ − f₃ = (J₂ y₃″ + B₂ y₃′)/r² + τ_c2 sgn y′/r, and its rates          (18)
         let inertia = machine.idler_pulley.inertia;
-        let pull = [
-            (acceleration * inertia / r + idler_b * speed / r + idler_c * sign) / r,
-            (jerk * inertia / r + idler_b * acceleration / r) / r,
-            (snap * inertia / r + idler_b * jerk / r) / r,
-        ]
-        .map(|pull| c.name("pull", pull));
-        // With y₃ − y = (k₃ (y₁ − y) − P)/(k₂ + k₃):  y₁ − y = (L + k₂ P/(k₂ + k₃))/k,  k = k₁ + k₂ k₃/(k₂ + k₃)
-        let share = c.name("share_of_k2", k2 / (k2 + k3));
-        let k = c.name("k", k1 + k2 * k3 / (k2 + k3));
-        let stretch: [C::N; 3] = std::array::from_fn(|j| {
-            let stretch = match machine.belt.model {
-                BeltModel::Elastic => (load[j] + share * pull[j]) / k,
-                BeltModel::TwoMass => load[j] / k,
-                BeltModel::Rigid => c.number(0.0),
-            };
-            c.name("stretch", stretch)
-        });
-        let behind: [C::N; 2] = std::array::from_fn(|j| match machine.belt.model {
+        let pull_of = |c: &mut C, y3: &Reference<C::N>| {
+            [
+                (y3.acceleration * inertia / r + idler_b * y3.speed / r + idler_c * sign) / r,
+                (y3.jerk * inertia / r + idler_b * y3.acceleration / r) / r,
+                (y3.snap * inertia / r + idler_b * y3.jerk / r) / r,
+            ]
+            .map(|pull| c.name("pull", pull))
+        };
+        let (drive, pull, spans, behind) = match machine.belt.model {
             BeltModel::Elastic => {
-                let behind = (k3 * stretch[j] - pull[j]) / (k2 + k3);
-                c.name("behind", behind)
+                // Quasi-static idler: y₃″ = y″ in P.
+                // With y₃ − y = (k₃ (y₁ − y) − P)/(k₂ + k₃):  y₁ − y = (L + P k₂/(k₂ + k₃))/k
+                let pull = pull_of(c, y);
+                let share = c.name("share_of_k2", k2 / (k2 + k3));
+                let stretch = std::array::from_fn(|j| c.name("stretch", (load[j] + share * pull[j]) / k));
+                let behind: [C::N; 2] =
+                    std::array::from_fn(|j| c.name("behind", (k3 * stretch[j] - pull[j]) / (k2 + k3)));
+                // f₁ = k₁ (y₁ − y),  f₂ = k₂ (y − y₃),  f₃ = k₃ (y₃ − y₁)
+                let spans = [k1 * stretch[0], -k2 * behind[0], k3 * (behind[0] - stretch[0])];
+                (ahead(c, y, stretch), pull, spans, behind)
             }
-            BeltModel::TwoMass | BeltModel::Rigid => stretch[j],
-        });
-        let drive = Reference {
-            position: c.name("drive_position", position + stretch[0]),
-            speed: c.name("drive_speed", speed + stretch[1]),
-            acceleration: c.name("drive_acceleration", acceleration + stretch[2]),
-            ..*y
+            BeltModel::TwoMass => {
+                // Without belt damping, the position of the cart is a flat output: with y₃ = y₁ and d = y₁ − y,
+                // k d = L,  k d′ = L′ − k′ d,  k d″ = L″ − 2 k′ d′ − k″ d,  k = k₁ + k₂ k₃/(k₂ + k₃)
+                let rates = self.stiffness_rates(c, y, [k1, in_series]);
+                let d = c.name("stretch", load[0] / k);
+                let change = rates.map_or(load[1], |[first, _]| load[1] - first * d);
+                let d_rate = c.name("stretch", change / k);
+                let change = rates.map_or(load[2], |[first, second]| load[2] - first * d_rate * 2.0 - second * d);
+                let d_second = c.name("stretch", change / k);
+                // k d‴ = L‴ = b y⁗ between jumps of y⁗, which only a jump of the current could follow.
+                let drive = Reference {
+                    jerk: c.name("drive_jerk", jerk + cart_b * snap / k),
+                    ..ahead(c, y, [d, d_rate, d_second])
+                };
+                // In series f₂ = f₃ = −d k₂ k₃/(k₂ + k₃); and P follows from y₁.
+                let slack_side = c.name("slack_side", -(in_series * d));
+                (drive, pull_of(c, &drive), [k1 * d, slack_side, slack_side], [d, d_rate])
+            }
+            BeltModel::Rigid => (*y, pull_of(c, y), [c.number(0.0); 3], [c.number(0.0); 2]),
         };
         // τ/r = ((J₁ + n² J_r) y₁″ + B₁ y₁′)/r² + τ_c1 sgn y′/r + L + P           (16)
         let n = machine.drives[0].motor.gear_ratio;
         let own = (machine.drive_pulley.inertia + n * n * machine.drives[0].motor.rotor_inertia) / (r * r);
         let force = drive.acceleration * own + drive_b * drive.speed + drive_c * sign / r + load[0] + pull[0];
-        let rate = jerk * own + drive_b * drive.acceleration + load[1] + pull[1];
-        // f₁ = k₁ (y₁ − y),  f₂ = k₂ (y − y₃),  f₃ = k₃ (y₃ − y₁);  in series f₂ = f₃ = k₂ k₃/(k₂ + k₃) (y − y₁)
-        let spans = match machine.belt.model {
-            BeltModel::Elastic => [k1 * stretch[0], -k2 * behind[0], k3 * (behind[0] - stretch[0])],
-            BeltModel::TwoMass => {
-                let in_series = -(share * k3 * stretch[0]);
-                [k1 * stretch[0], in_series, in_series]
-            }
-            BeltModel::Rigid => [c.number(0.0); 3],
-        };
+        let rate = drive.jerk * own + drive_b * drive.acceleration + load[1] + pull[1];
         let force = [c.name("push", force), c.name("push_rate", rate)];
         Needed { drive, idler: [position + behind[0], speed + behind[1]], force, spans }
+    }
+
+    /// First and second rate of k = k₁ + k₂₃ along the reference, N/(m s) and N/(m s²); none if it is constant.
+    fn stiffness_rates<C: Calculator>(
+        &self,
+        c: &mut C,
+        y: &Reference<C::N>,
+        [k1, in_series]: [C::N; 2],
+    ) -> Option<[C::N; 2]> {
+        let rigidity = self.machine.belt.following()?.rigidity();
+        // k₁ = A E/(l₁ − y), k₂₃ = A E/(l₂ + l₃ + y):  dk/dy = (k₁² − k₂₃²)/(A E),  d²k/dy² = 2 (k₁³ + k₂₃³)/(A E)²
+        let [of_1, of_23] = [k1 * k1, in_series * in_series];
+        let slope = c.name("k_slope", (of_1 - of_23) / rigidity);
+        let curve = c.name("k_curve", (of_1 * k1 + of_23 * in_series) * (2.0 / (rigidity * rigidity)));
+        // k′ = dk/dy y′,  k″ = d²k/dy² y′² + dk/dy y″
+        let rate = c.name("k_rate", slope * y.speed);
+        let second = c.name("k_second", curve * (y.speed * y.speed) + slope * y.acceleration);
+        Some([rate, second])
     }
 
     /// Reference of the encoder for which the cart follows `y`.

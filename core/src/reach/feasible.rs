@@ -1,6 +1,7 @@
 //! Feasibility of a reference: the requirements on motor, amplifier, belt and travel, and their limits.
 
 use super::compensation::{Compensation, direction};
+use super::course::{AtInstant, Course};
 use super::forward::Forward;
 use super::pull_out::Curve;
 use crate::calculator::Evaluation;
@@ -11,11 +12,17 @@ use crate::metrics::Peak;
 use crate::number::engineering;
 use crate::signal::profile::{Profile, Reference};
 
-/// Number of instants at which a reference is evaluated.
-const INSTANTS: usize = 4000;
+/// Time in which an acceleration jumps, relative to the reference, for the jerk of a message.
+const JUMP: f64 = 1.0 / 4000.0;
 
 /// Relative excess of a requested limit that rounding explains.
 const ROUNDED: f64 = 1e-6;
+
+/// Jump of an acceleration, relative to the largest, that the distance of instants on either side of a seam explains.
+const SMOOTH: f64 = 1e-4;
+
+/// Limit that stands for zero, of any unit.
+const LEAST: f64 = 1e-100;
 
 /// Share of the pretension that a run takes off a span without slack: a slack span has lost all of it, to rounding.
 const TAUT: f64 = 1.0 - 1e-6;
@@ -56,30 +63,60 @@ struct Need {
     voltage: f64,
     /// Forces in the spans relative to the pretension, N; zero for a rigid belt.
     spans: [f64; 3],
+    /// Speed and acceleration of the reference and of the drive pulley; with several drives, of both slides and of the
+    /// belt of the drive.
+    motions: [[f64; 2]; 3],
+}
+
+impl AtInstant for Instant {
+    fn time(&self) -> f64 {
+        self.time
+    }
+
+    fn motions(&self) -> [[f64; 2]; 3] {
+        motions(&[self.y])
+    }
+}
+
+impl AtInstant for Need {
+    fn time(&self) -> f64 {
+        self.at.time
+    }
+
+    fn motions(&self) -> [[f64; 2]; 3] {
+        self.motions
+    }
+}
+
+/// Speed and acceleration of up to three references.
+fn motions(references: &[Reference]) -> [[f64; 2]; 3] {
+    std::array::from_fn(|k| references.get(k).map_or([0.0; 2], |y| [y.speed, y.acceleration]))
 }
 
 /// A quantity at one instant of a reference.
-type AtInstant = Box<dyn Fn(&Need) -> f64>;
+type Quantity = Box<dyn Fn(&Need) -> f64>;
 
 /// A limit of the machine and the requirement that it bounds, with the words of its message before, between and after
 /// the values.
 struct Demand {
     limit: &'static str,
     unit: &'static str,
-    allowed: AtInstant,
-    needed: AtInstant,
+    allowed: Quantity,
+    needed: Quantity,
     words: [&'static str; 3],
 }
 
 impl Demand {
+    /// Requirement as a fraction of the limit; a limit may be zero.
+    fn share(&self, need: &Need) -> f64 {
+        (self.needed)(need) / (self.allowed)(need).max(LEAST)
+    }
+
     /// Instant with the largest use of the limit, its requirement, and the allowed value there.
-    fn most<'a>(&self, needs: &'a [Need]) -> Option<(&'a Need, [f64; 2])> {
-        let both = needs.iter().map(|need| (need, [(self.needed)(need), (self.allowed)(need)]));
-        // Compares a/of_a with b/of_b; a limit may be zero.
-        both.max_by(|(_, [a, of_a]), (_, [b, of_b])| match of_a == of_b {
-            true => a.total_cmp(b),
-            false => (a * of_b).total_cmp(&(b * of_a)),
-        })
+    fn most(&self, course: &Course<Need>) -> (Need, [f64; 2]) {
+        let need = course.most(|need| self.share(need));
+        let both = [(self.needed)(&need), (self.allowed)(&need)];
+        (need, both)
     }
 }
 
@@ -114,7 +151,7 @@ impl Load {
 
     /// True for limits of the motor or its supply, of which a loop, or the oscillation of a stepper, needs a reserve.
     pub fn is_of_motor(&self) -> bool {
-        ["voltage", "current", "pull_out"].contains(&self.limit)
+        is_of_motor(self.limit)
     }
 }
 
@@ -235,22 +272,45 @@ fn electrical(volts: Option<f64>, amperes: Option<f64>) -> Vec<Demand> {
     voltage.into_iter().chain(current).collect()
 }
 
-/// Largest use of each limit by references, evaluated at `instants` times; of several drives, the most loaded one.
-pub fn loads(machine: &Machine, bounds: Bounds, profiles: &[Profile], instants: usize) -> Vec<Load> {
-    let load = |needs: &[Need], demand: Demand| {
-        let [needed, allowed] = demand.most(needs).map_or([0.0, 1.0], |(_, both)| both);
-        Load { limit: demand.limit, unit: demand.unit, needed: needed.max(0.0), allowed }
-    };
-    if let [profile] = profiles {
-        let needs = needs(machine, profile, instants);
-        return demands(machine, bounds).into_iter().map(|demand| load(&needs, demand)).collect();
-    }
+/// Limits of a machine under a controller, those of each drive with its requirements along references; with several
+/// drives, those of the motors.
+fn demanded<'a>(
+    machine: &'a Machine,
+    bounds: Bounds,
+    profiles: &'a [Profile],
+) -> impl Iterator<Item = (Course<'a, Need>, Vec<Demand>)> {
+    (0..machine.drives.len()).map(move |drive| match profiles {
+        [profile] => (needs(machine, profile), demands(machine, bounds)),
+        _ => (needs_of_drive(machine, drive, profiles), of_motor(machine, drive, bounds)),
+    })
+}
+
+/// Largest use of each limit by references, shapers included; of several drives, the most loaded one.
+pub fn loads(machine: &Machine, bounds: Bounds, profiles: &[Profile]) -> Vec<Load> {
     let mut all: Vec<Load> = Vec::new();
-    for drive in 0..machine.drives.len() {
-        let needs = needs_of_drive(machine, drive, profiles, instants);
-        of_motor(machine, drive, bounds).into_iter().for_each(|demand| load(&needs, demand).join(&mut all));
+    for (course, demands) in demanded(machine, bounds, profiles) {
+        for demand in demands {
+            let (_, [needed, allowed]) = demand.most(&course);
+            Load { limit: demand.limit, unit: demand.unit, needed: needed.max(0.0), allowed }.join(&mut all);
+        }
     }
     all
+}
+
+/// True if references, shapers included, use at most this fraction of each limit: of those of the motors, and of the
+/// others.
+pub(super) fn are_within(machine: &Machine, bounds: Bounds, profiles: &[Profile], [motor, belt]: [f64; 2]) -> bool {
+    demanded(machine, bounds, profiles).all(|(course, demands)| {
+        demands.iter().all(|demand| {
+            let share = if is_of_motor(demand.limit) { motor } else { belt };
+            !course.exceeds(share, |need| demand.share(need))
+        })
+    })
+}
+
+/// True for limits of a motor or its supply.
+fn is_of_motor(limit: &str) -> bool {
+    ["voltage", "current", "pull_out"].contains(&limit)
 }
 
 /// Limits that `profile`, shaper included, exceeds on this machine under a controller with these limits;
@@ -270,35 +330,33 @@ pub fn shortfalls(machine: &Machine, bounds: Bounds, profiles: &[Profile]) -> Ve
 
 /// Limits exceeded at one drive of a machine with several.
 fn of_drive(machine: &Machine, bounds: Bounds, drive: usize, profiles: &[Profile]) -> Vec<Shortfall> {
-    let needs = needs_of_drive(machine, drive, profiles, INSTANTS);
+    let needs = needs_of_drive(machine, drive, profiles);
     let name = machine.geometry().drives[drive].label.name;
     let exceeded = of_motor(machine, drive, bounds).into_iter().filter_map(|demand| exceeded(&needs, &demand));
     exceeded.map(|short| Shortfall { words: format!("{name}: {}", short.words), ..short }).collect()
 }
 
 /// Requirements of one of several drives, with rigid belts.
-fn needs_of_drive(machine: &Machine, drive: usize, profiles: &[Profile], instants: usize) -> Vec<Need> {
+fn needs_of_drive<'a>(machine: &Machine, drive: usize, profiles: &'a [Profile]) -> Course<'a, Need> {
     let all = FeedForward { model: FeedForwardModel::Rigid, ..FeedForward::NONE };
-    let Some(forward) = Forward::new(all, machine, drive) else { return Vec::new() };
-    let end = Profile::last_rest(profiles);
-    let need = |k: usize| {
-        let time = end * k as f64 / instants as f64;
+    let forward = Forward::new(all, machine, drive).expect("a machine with several drives");
+    Course::new(profiles, has_lines(machine), move |time| {
         let slides: Vec<Reference> = profiles.iter().map(|profile| profile.at(time)).collect();
         let (current, voltage) = forward.electrical(&slides);
-        let (force, spans) = (forward.force(&slides), [0.0; 3]);
-        Need {
-            at: Instant { time, y: forward.along(&mut Evaluation::plain(), &slides) },
-            force,
-            current,
-            voltage,
-            spans,
-        }
-    };
-    (0..=instants).map(need).collect()
+        let along = forward.along(&mut Evaluation::plain(), &slides);
+        let motions = motions(&[&slides[..], &[along]].concat());
+        let at = Instant { time, y: along };
+        Need { at, force: forward.force(&slides), current, voltage, spans: [0.0; 3], motions }
+    })
+}
+
+/// True if the force on a slide depends on its position or speed.
+fn has_lines(machine: &Machine) -> bool {
+    machine.slides().any(|slide| slide.forces.along.is_some() || slide.forces.by_speed.is_some())
 }
 
 fn of_axis(machine: &Machine, bounds: Bounds, profile: &Profile) -> Vec<Shortfall> {
-    let needs = needs(machine, profile, INSTANTS);
+    let needs = needs(machine, profile);
     let (volts, _) = limits(machine, bounds);
     let mut found: Vec<Shortfall> = Vec::new();
     for demand in demands(machine, bounds) {
@@ -326,15 +384,15 @@ impl Instant {
 }
 
 /// Instant of the largest requirement, if it exceeds the limit.
-fn most<T>(instants: &[T], allowed: f64, needed: impl Fn(&T) -> f64) -> Option<&T> {
-    let most = instants.iter().max_by(|a, b| needed(a).total_cmp(&needed(b)))?;
-    (needed(most) - allowed > 1e-9 * allowed.abs().max(1.0)).then_some(most)
+fn most<T: AtInstant>(course: &Course<T>, allowed: f64, needed: impl Fn(&T) -> f64) -> Option<T> {
+    let most = course.most(&needed);
+    (needed(&most) - allowed > 1e-9 * allowed.abs().max(1.0)).then_some(most)
 }
 
 /// The limit, if the motion exceeds it.
-fn exceeded(needs: &[Need], demand: &Demand) -> Option<Shortfall> {
+fn exceeded(needs: &Course<Need>, demand: &Demand) -> Option<Shortfall> {
     let &Demand { limit, unit, words: [comes_by, behind, there], .. } = demand;
-    let (need, [needed, allowed]) = demand.most(needs)?;
+    let (need, [needed, allowed]) = demand.most(needs);
     if needed - allowed <= 1e-9 * allowed.abs().max(1.0) {
         return None;
     }
@@ -349,14 +407,14 @@ fn exceeded(needs: &[Need], demand: &Demand) -> Option<Shortfall> {
 }
 
 /// The voltage limit, if the largest speed alone exceeds it without acceleration.
-fn of_speed(machine: &Machine, volts: Option<f64>, needs: &[Need]) -> Option<Shortfall> {
+fn of_speed(machine: &Machine, volts: Option<f64>, needs: &Course<Need>) -> Option<Shortfall> {
     let (volts, rigid) = (volts?, Rigid::new(machine));
     most(needs, volts, |need| need.voltage.abs())?;
     let steady = |speed: f64| {
         let (viscous, dry) = rigid.friction(speed, speed.signum());
         rigid.electrical(viscous + dry - rigid.constant, 0.0, &Reference::steady(speed)).1.abs()
     };
-    let fastest = needs.iter().max_by(|a, b| a.at.y.speed.abs().total_cmp(&b.at.y.speed.abs()))?;
+    let fastest = needs.most(|need| need.at.y.speed.abs());
     let speed = fastest.at.y.speed;
     let (at_rest, needed) = (steady(1e-9 * speed), steady(speed));
     if needed <= volts {
@@ -377,9 +435,8 @@ fn of_speed(machine: &Machine, volts: Option<f64>, needs: &[Need]) -> Option<Sho
 
 /// Limits that the reference of one slide exceeds; with several slides the message names it.
 fn of_slide(machine: &Machine, bounds: Bounds, number: usize, profile: &Profile) -> Vec<Shortfall> {
-    let end = profile.rest();
     let at = |time: f64| Instant { time, y: profile.at(time) };
-    let instants: Vec<Instant> = (0..=INSTANTS).map(|k| at(end * k as f64 / INSTANTS as f64)).collect();
+    let instants = Course::new(std::slice::from_ref(profile), has_lines(machine), at);
     let found = [of_breakaway(machine, bounds, number, &instants), of_travel(machine, number, &instants)];
     let body = machine.geometry().slides[number].body;
     let name = machine.bridge.as_ref().map(|_| machine.geometry().label(body).name);
@@ -391,7 +448,7 @@ fn of_slide(machine: &Machine, bounds: Bounds, number: usize, profile: &Profile)
 }
 
 /// Breakaway force of a slide with everything that turns with it, if the motors give less at standstill.
-fn of_breakaway(machine: &Machine, bounds: Bounds, number: usize, instants: &[Instant]) -> Option<Shortfall> {
+fn of_breakaway(machine: &Machine, bounds: Bounds, number: usize, instants: &Course<Instant>) -> Option<Shortfall> {
     let at_standstill = |drive: usize| {
         if let Some(curve) = Curve::from_unit(&machine.drives[drive]) {
             return Some(curve.torque(0.0) / machine.pulley_radius);
@@ -402,7 +459,7 @@ fn of_breakaway(machine: &Machine, bounds: Bounds, number: usize, instants: &[In
         force.into_iter().flatten().reduce(f64::min)
     };
     let force = machine.movers(number).map(|(drive, _)| at_standstill(drive)).sum::<Option<f64>>()?;
-    instants.iter().find_map(|at| {
+    instants.values().find_map(|at| {
         let side = direction(&at.y);
         let needed = machine.breakaway(number, side, at.y.position);
         let provides = if machine.movers(number).count() == 1 { "the motor provides" } else { "the motors provide" };
@@ -411,38 +468,56 @@ fn of_breakaway(machine: &Machine, bounds: Bounds, number: usize, instants: &[In
     })
 }
 
+/// References of all slides at one instant.
+struct OnPath {
+    time: f64,
+    slides: Vec<Reference>,
+}
+
+impl OnPath {
+    /// Length of the vector with these components.
+    fn norm(&self, of: fn(&Reference) -> f64) -> f64 {
+        self.slides.iter().map(|y| of(y).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+impl AtInstant for OnPath {
+    fn time(&self) -> f64 {
+        self.time
+    }
+
+    fn motions(&self) -> [[f64; 2]; 3] {
+        motions(&self.slides)
+    }
+}
+
 /// A requested limit: its name, its unit, and the value, if there is one.
 pub(super) type Requested = (&'static str, &'static str, Option<f64>);
 
 /// Those of these limits of speed, acceleration and jerk along a path that references exceed. An acceleration that jumps
 /// exceeds any jerk; on arcs, only the speed counts.
 pub(super) fn along_path(profiles: &[Profile], limits: [Requested; 3]) -> Vec<Shortfall> {
-    let step = Profile::last_end(profiles) / INSTANTS as f64;
     let arcs: Vec<[f64; 2]> = (profiles.iter().flat_map(Profile::passages))
         .filter(|passage| passage.turn.is_some())
-        .map(|passage| [passage.begin - step, passage.begin + passage.duration() + step])
+        .map(|passage| [passage.begin, passage.begin + passage.duration()])
         .collect();
-    let at = |time: f64| profiles.iter().map(|profile| profile.at(time)).collect::<Vec<_>>();
-    let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
-    let mut most = [(0.0, 0.0); 3];
-    let mut before = at(0.0);
-    for k in 0..=INSTANTS {
-        let time = step * k as f64;
-        let now = at(time);
-        // |a(t₂) − a(t₁)| ≤ ∫ |j| dt
-        let change = norm(&mut before.iter().zip(&now).map(|(a, b)| b.acceleration - a.acceleration));
-        let values = [
-            norm(&mut now.iter().map(|y| y.speed)),
-            norm(&mut now.iter().map(|y| y.acceleration)),
-            norm(&mut now.iter().map(|y| y.jerk)).max(if step > 0.0 { change / step } else { 0.0 }),
-        ];
-        let is_on_arc = arcs.iter().any(|[begin, end]| (*begin..=*end).contains(&time));
-        for (most, value) in most.iter_mut().zip(values).take(if is_on_arc { 1 } else { 3 }) {
-            if value > most.0 {
-                *most = (value, time);
-            }
+    let at = |time: f64| OnPath { time, slides: profiles.iter().map(|profile| profile.at(time)).collect() };
+    let course = Course::new(profiles, false, at);
+    let of: [fn(&Reference) -> f64; 3] = [|y| y.speed, |y| y.acceleration, |y| y.jerk];
+    let is_straight = |at: &OnPath| !arcs.iter().any(|[begin, end]| (*begin..=*end).contains(&at.time));
+    let mut most: [(f64, f64); 3] = std::array::from_fn(|k| {
+        let value = |at: &OnPath| if k == 0 || is_straight(at) { at.norm(of[k]) } else { 0.0 };
+        let at = course.most(value);
+        (value(&at), at.time)
+    });
+    // |a(t₂) − a(t₁)| ≤ ∫ |j| dt
+    let within = JUMP * Profile::last_rest(profiles);
+    for (before, after) in course.seams().filter(|(before, after)| is_straight(before) && is_straight(after)) {
+        let jump = |(a, b): (&Reference, &Reference)| (b.acceleration - a.acceleration).powi(2);
+        let jump = before.slides.iter().zip(&after.slides).map(jump).sum::<f64>().sqrt();
+        if jump > most[1].0 * SMOOTH && jump / within > most[2].0 {
+            most[2] = (jump / within, after.time);
         }
-        before = now;
     }
     let exceeded = |((limit, unit, allowed), (needed, time)): (Requested, (f64, f64))| {
         let allowed = allowed.filter(|allowed| needed > allowed * (1.0 + ROUNDED))?;
@@ -456,13 +531,9 @@ pub(super) fn along_path(profiles: &[Profile], limits: [Requested; 3]) -> Vec<Sh
 /// Limits of the motors of which references, shaper included, leave less than this reserve, 0 to 1.
 pub fn without_reserve(machine: &Machine, bounds: Bounds, profiles: &[Profile], reserve: f64) -> Vec<Shortfall> {
     let mut found = Vec::new();
-    for drive in 0..machine.drives.len() {
-        let needs = match profiles {
-            [profile] => needs(machine, profile, INSTANTS),
-            _ => needs_of_drive(machine, drive, profiles, INSTANTS),
-        };
-        for demand in of_motor(machine, drive, bounds) {
-            let Some((need, [needed, allowed])) = demand.most(&needs) else { continue };
+    for (course, demands) in demanded(machine, bounds, profiles) {
+        for demand in demands.into_iter().filter(|demand| is_of_motor(demand.limit)) {
+            let (need, [needed, allowed]) = demand.most(&course);
             let left = (1.0 - reserve) * allowed;
             if needed <= left * (1.0 + ROUNDED) {
                 continue;
@@ -476,7 +547,7 @@ pub fn without_reserve(machine: &Machine, bounds: Bounds, profiles: &[Profile], 
 }
 
 /// The end of a slide's travel, if its reference exceeds it.
-fn of_travel(machine: &Machine, number: usize, instants: &[Instant]) -> Option<Shortfall> {
+fn of_travel(machine: &Machine, number: usize, instants: &Course<Instant>) -> Option<Shortfall> {
     let travel = machine.slide(number)?.travel?;
     let beyond = |at: &Instant| (at.y.position - travel.max).max(travel.min - at.y.position);
     let at = most(instants, 0.0, beyond)?;
@@ -517,17 +588,17 @@ fn limits_of(machine: &Machine, drive: usize, bounds: Bounds) -> (Option<f64>, O
     }
 }
 
-fn needs(machine: &Machine, profile: &Profile, instants: usize) -> Vec<Need> {
+/// Requirements of an axis.
+fn needs<'a>(machine: &'a Machine, profile: &'a Profile) -> Course<'a, Need> {
     let compensation = Compensation::new(machine, &FeedForward::NONE);
-    let need = |time: f64| {
+    Course::new(std::slice::from_ref(profile), has_lines(machine), move |time| {
         let y = profile.at(time);
         // It contains a force along the travel, but not one by speed.
         let needed = compensation.needed(&y);
         let by_speed = machine.cart.forces.by_speed.as_ref().map_or(0.0, |line| line.value(y.speed));
         let force = needed.force[0] - by_speed;
         let (current, voltage) = compensation.rigid.electrical(force, needed.force[1], &needed.drive);
-        Need { at: Instant { time, y }, force, current, voltage, spans: needed.spans }
-    };
-    let end = profile.rest();
-    (0..=instants).map(|k| need(end * k as f64 / instants as f64)).collect()
+        let (at, motions) = (Instant { time, y }, motions(&[y, needed.drive]));
+        Need { at, force, current, voltage, spans: needed.spans, motions }
+    })
 }

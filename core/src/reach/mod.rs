@@ -2,6 +2,7 @@
 //! it excites, and the quickest moves.
 
 pub mod compensation;
+mod course;
 pub mod feasible;
 pub mod forward;
 pub mod pull_out;

@@ -1,7 +1,7 @@
 //! Quickest moves of a machine: speed, acceleration, jerk and snap within its limits, for a gantry along its path, with
 //! jerk and snap times at the zeros of the belt's modes.
 
-use super::feasible::{Load, Shortfall, along_path, limits, loads, shortfalls};
+use super::feasible::{Load, Shortfall, along_path, are_within, limits, loads, shortfalls};
 use super::resonance::{Drive, reaches, resonances};
 use crate::design::{Bounds, Design};
 use crate::error::{Error, Result};
@@ -11,15 +11,15 @@ use crate::parameter;
 use crate::signal::arc::Arc;
 use crate::signal::profile::{Leg, Limits, Passage, Profile};
 
-/// Number of instants of a reference that a search evaluates.
-pub const INSTANTS: usize = 160;
-/// Number of instants at which a plan is checked.
-pub const CLOSELY: usize = 4000;
-
 /// Number of cruising speeds on the grid, steps of golden section after it, and bisections of the acceleration.
 const SPEEDS: usize = 10;
 const NARROWED: usize = 8;
-const BISECTIONS: usize = 14;
+const BISECTIONS: usize = 16;
+
+/// Factor between accelerations that are tried from the largest down, and the smallest, m/s² and relative to the
+/// largest.
+const LOWER: f64 = 0.1;
+const LEAST: [f64; 2] = [1e-3, 1e-4];
 
 /// Jerk and snap time without a mode, in samples of the controller.
 const SHORTEST: [f64; 2] = [4.0, 1.0];
@@ -93,7 +93,7 @@ pub fn within_pull_out(machine: &Machine, slide: usize) -> Option<f64> {
         let limits = Limits { speed: (acceleration * way).sqrt(), acceleration, jerk: None, snap: None };
         let legs = [Leg::To(there.clone(), limits), Leg::To(start.clone(), limits)];
         let Ok(profiles) = Profile::of_legs(&start, &legs) else { return false };
-        let loads = loads(machine, Bounds::default(), &profiles, INSTANTS);
+        let loads = loads(machine, Bounds::default(), &profiles);
         loads.iter().filter(|load| load.limit == "pull_out").all(|load| load.share() <= allowed)
     };
     let [mut low, mut high] = ACCELERATIONS;
@@ -133,11 +133,6 @@ pub struct Share {
 impl Share {
     /// The whole of each.
     pub const ALL: Self = Self { motor: 1.0, belt: 1.0 };
-
-    /// That of the limit of this load.
-    fn value(&self, load: &Load) -> f64 {
-        if load.is_of_motor() { self.motor } else { self.belt }
-    }
 }
 
 /// Path of a move from leg to leg, without its limits.
@@ -262,19 +257,14 @@ impl Quickest<'_> {
         share: Share,
         others: &dyn Fn(&[Profile]) -> Vec<Load>,
     ) -> Result<Option<Limits>> {
-        let wanted = Share { motor: share.motor * (1.0 - self.wanted.reserve), ..share };
-        let mut share = wanted;
+        let mut share = Share { motor: share.motor * (1.0 - self.wanted.reserve), ..share };
         for _ in 0..CORRECTIONS {
             let Some(limits) = self.searched(way, periods, share) else { return Ok(None) };
             let profiles = self.design.shaped(&way.within(&limits)?);
-            // On the finer grid of instants, the axis needs slightly more than during the search.
-            let closely = loads(self.machine, self.design.bounds(), &profiles, CLOSELY);
-            let others = others(&profiles);
-            let own = closely.iter().map(|load| (load, wanted.value(load)));
             let mut most = Share { motor: 0.0, belt: 0.0 };
-            for (load, allowed) in own.chain(others.iter().map(|load| (load, Share::ALL.value(load)))) {
+            for load in others(&profiles) {
                 let most = if load.is_of_motor() { &mut most.motor } else { &mut most.belt };
-                *most = most.max(load.share() / allowed);
+                *most = most.max(load.share());
             }
             if most.motor <= 1.0 && most.belt <= 1.0 {
                 return Ok(Some(limits));
@@ -305,23 +295,29 @@ impl Quickest<'_> {
             if within(most) {
                 return Some(most);
             }
-            let mut ends = [1e-4 * most, most];
-            if !within(ends[0]) {
-                return None;
+            let (mut low, mut high) = (LOWER * most, most);
+            while !within(low) {
+                if low < LEAST[0].min(LEAST[1] * most) {
+                    return None;
+                }
+                (low, high) = (LOWER * low, low);
             }
             for _ in 0..BISECTIONS {
-                let middle = (ends[0] * ends[1]).sqrt();
-                ends[usize::from(!within(middle))] = middle;
+                let middle = (low * high).sqrt();
+                *if within(middle) { &mut low } else { &mut high } = middle;
             }
-            Some(ends[0])
+            Some(low)
         };
         let duration = |speed: f64| -> (f64, Option<Limits>) {
             let Some(a) = acceleration(speed) else { return (f64::INFINITY, None) };
             let limits = self.limits(speed, a, periods, times);
             (way.within(&limits).map_or(f64::INFINITY, |profiles| profiles[0].end()), Some(limits))
         };
-        // At most the speed reached without cruising.
-        let fastest = (way.longest * most).sqrt().min(self.wanted.speed.unwrap_or(f64::INFINITY));
+        // At most the speed reached without cruising: a higher one leaves less acceleration, and is not reached.
+        let mut fastest = (way.longest * most).sqrt().min(self.wanted.speed.unwrap_or(f64::INFINITY));
+        if let (_, Some(limits)) = duration(fastest) {
+            fastest = peak_speed(&way.within(&limits).ok()?).min(fastest);
+        }
         let grid = |k: usize| fastest * SLOWEST.powf(k as f64 / (SPEEDS - 1) as f64);
         let found: Vec<(f64, f64, Option<Limits>)> = (0..SPEEDS)
             .map(|k| {
@@ -341,21 +337,23 @@ impl Quickest<'_> {
         });
         let limits = best_yet.1?;
         // If no stroke cruises, the largest speed of the longest one.
-        let profiles = way.within(&limits).ok()?;
-        let middles = profiles[0].passages().iter().map(|passage| passage.begin + 0.5 * passage.duration());
-        let speed_at = |time: f64| match &profiles[..] {
-            [profile] => profile.at(time).speed.abs(),
-            _ => profiles.iter().map(|profile| profile.at(time).speed.powi(2)).sum::<f64>().sqrt(),
-        };
-        let peaks = middles.map(speed_at);
-        let speed = peaks.fold(0.0, f64::max).min(limits.speed);
+        let speed = peak_speed(&way.within(&limits).ok()?).min(limits.speed);
         Some(Limits { speed, ..limits })
     }
 
     /// True if a move within these limits uses at most these fractions of the limits of the machine.
     fn is_within(&self, way: &MovePath, limits: &Limits, share: Share) -> bool {
         let Ok(profiles) = way.within(limits) else { return false };
-        let loads = loads(self.machine, self.design.bounds(), &self.design.shaped(&profiles), INSTANTS);
-        loads.iter().all(|load| load.share() <= share.value(load))
+        are_within(self.machine, self.design.bounds(), &self.design.shaped(&profiles), [share.motor, share.belt])
     }
+}
+
+/// Largest speed along a path, m/s.
+fn peak_speed(profiles: &[Profile]) -> f64 {
+    let middles = profiles[0].passages().iter().map(|passage| passage.begin + 0.5 * passage.duration());
+    let speed_at = |time: f64| match profiles {
+        [profile] => profile.at(time).speed.abs(),
+        _ => profiles.iter().map(|profile| profile.at(time).speed.powi(2)).sum::<f64>().sqrt(),
+    };
+    middles.map(speed_at).fold(0.0, f64::max)
 }

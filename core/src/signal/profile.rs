@@ -306,6 +306,13 @@ impl Passage {
         }
     }
 
+    /// Begin and end of each polynomial of its stroke, s.
+    fn seams(&self) -> impl Iterator<Item = f64> {
+        let Self { begin, stroke: Stroke { duration, pieces, .. }, .. } = self;
+        let first = pieces.iter().map(|(seam, _)| *seam).filter(move |seam| *seam <= 0.5 * duration);
+        first.flat_map(move |seam| [begin + seam, begin + (duration - seam)])
+    }
+
     /// The end of the polynomial that holds at `t`, s.
     fn seam(&self, t: f64) -> f64 {
         let seam = self.begin + self.stroke.seam(t - self.begin);
@@ -539,6 +546,29 @@ impl Profile {
         let Reference { position, speed, acceleration, jerk, snap } =
             passage.placed(passage.stroke.reference(t - passage.begin, true));
         ([position, speed, acceleration / 2.0, jerk / 6.0, snap / 24.0], passage.seam(t))
+    }
+
+    /// Times at which a derivative of one of these references jumps, shapers included, in ascending order, s: the ends
+    /// of the segments of each stroke, and the samples of a log.
+    pub fn seams(profiles: &[Self]) -> Vec<f64> {
+        let of_profile = |profile: &Self| -> Vec<f64> {
+            let samples = profile.samples.iter().map(|(time, _)| *time);
+            profile.passages.iter().flat_map(Passage::seams).chain(samples).collect()
+        };
+        let through = |profile: &Self, seams: Vec<f64>| -> Vec<f64> {
+            if profile.shaper.is_empty() {
+                return seams;
+            }
+            profile.shaper.iter().flat_map(|[late, _]| seams.iter().map(move |seam| late + seam)).collect()
+        };
+        let mut seams: Vec<f64> = profiles.iter().flat_map(|profile| through(profile, of_profile(profile))).collect();
+        seams.sort_by(f64::total_cmp);
+        seams
+    }
+
+    /// True if it is known by the samples of a log.
+    pub fn is_sampled(&self) -> bool {
+        !self.samples.is_empty()
     }
 
     /// When the last leg ends, s, a shaper apart.
