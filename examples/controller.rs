@@ -3,7 +3,7 @@
 use std::time::Instant;
 use taut::case::{Case, TEMPLATE};
 use taut::control::{Controller, Loop, Observation, Setup, close, closed_loop};
-use taut::design::{Design, FeedForward, Pid, Structure};
+use taut::design::{Design, Pid, Structure};
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::solve::Solver;
 
@@ -23,32 +23,15 @@ impl Controller for Relay {
 fn main() -> taut::Result<()> {
     let case = Case::from_text_with("axis.toml", TEMPLATE, &["encoder.lines=3000"])?;
     let machine = &case.machine;
-    let limits = Limits { speed: 0.3, acceleration: 4.0, jerk: Some(200.0), snap: None };
+    let limits = Limits { jerk: Some(200.0), ..Limits::new(0.3, 4.0) };
     let path = [Profile::new(0.0, &[Leg::To(0.1, limits)])?];
-    let timing = Loop { every: 1e-3, delay: 0.0, limit: Some(24.0), lead: 0.0 };
+    let timing = Loop { limit: Some(24.0), ..Loop::sampled(1e-3) };
     let run = close(machine, &mut [&mut Relay { volts: 10.0 }], &timing, &path, 1.0, 50e-6, Solver::Exact)?;
     println!("relay: cart error at most {:.1} µm", 1e6 * run.figures.cart().error.peak.value.abs());
 
-    let pid = Pid {
-        proportional: 3000.0,
-        integral: 60e3,
-        derivative: 10.0,
-        filter: 200.0,
-        reference_speed: 1.0,
-        tracking: 0.05,
-    };
-    let design = Design {
-        every: 1e-3,
-        delay: 0.0,
-        limit: Some(24.0),
-        structure: Structure::Pid(pid),
-        feed_forward: FeedForward::NONE,
-        disturbance_observer: None,
-        filters: Vec::new(),
-        shaper: Vec::new(),
-    };
-    let solver = Solver::Exact;
-    let setup = Setup { machine, model: machine, design: &design, profiles: &path, until: 1.0, window: 50e-6, solver };
+    let pid = Pid { integral: 60e3, derivative: 10.0, ..Pid::new(3000.0) };
+    let design = Design { limit: Some(24.0), ..Design::new(1e-3, Structure::Pid(pid)) };
+    let setup = Setup { window: 50e-6, ..Setup::new(machine, &design, &path, 1.0) };
     let mut best = f64::INFINITY;
     for _ in 0..200 {
         let begin = Instant::now();

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 from pathlib import Path
 
@@ -32,9 +33,14 @@ def is_property(node: ast.FunctionDef) -> bool:
     return any(isinstance(d, ast.Name) and d.id in {"property", "cached_property"} for d in node.decorator_list)
 
 
-def doc(node: ast.ClassDef | ast.FunctionDef, indent: str = "") -> str:
+def doc(node: ast.ClassDef | ast.FunctionDef | ast.Module, indent: str = "") -> str:
     """The docstring, with code between single backquotes."""
-    text = re.sub(r":\w+:`~?([^`]+)`", r"`\1`", (ast.get_docstring(node) or "").replace("``", "`"))
+    return plain(ast.get_docstring(node) or "", indent)
+
+
+def plain(text: str, indent: str) -> str:
+    """Text of a docstring as Markdown."""
+    text = re.sub(r":\w+:`~?([^`]+)`", r"`\1`", inspect.cleandoc(text).replace("``", "`"))
     return "\n".join(indent + line if line else "" for line in text.splitlines())
 
 
@@ -47,11 +53,30 @@ def signature(node: ast.FunctionDef) -> str:
     return f"{node.name}({arguments}){result}"
 
 
-def described(name: str, node: ast.ClassDef | ast.FunctionDef) -> str:
+def fields(body: list[ast.stmt]) -> list[str]:
+    """Annotated or assigned names with a string below them: fields of a class, names of types of a module."""
+    shown = []
+    for node, below in zip(body, body[1:]):
+        if not (isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant) and isinstance(below.value.value, str)):
+            continue
+        if isinstance(node, ast.AnnAssign):
+            given = f" = {ast.unparse(node.value)}" if node.value else ""
+            name, shape = ast.unparse(node.target), f"{ast.unparse(node.target)}: {ast.unparse(node.annotation)}{given}"
+        elif isinstance(node, ast.Assign):
+            name, shape = ast.unparse(node.targets[0]), ast.unparse(node)
+        else:
+            continue
+        if not name.startswith("_"):
+            shown.append(f"- `{shape}`\n\n{plain(below.value.value, '  ')}\n")
+    return shown
+
+
+def described(name: str, node: ast.ClassDef | ast.FunctionDef, level: str = "##") -> str:
     """One section."""
     if isinstance(node, ast.FunctionDef):
-        return f"## {name}\n\n```text\n{signature(node)}\n```\n\n{doc(node)}\n"
-    text = f"## {name}\n\n{doc(node)}\n"
+        return f"{level} {name}\n\n```text\n{signature(node)}\n```\n\n{doc(node)}\n"
+    text = f"{level} {name}\n\n{doc(node)}\n"
+    text += "".join(f"\n{field}" for field in fields(node.body))
     for member in node.body:
         if not isinstance(member, ast.FunctionDef) or (member.name.startswith("_") and member.name != "__init__"):
             continue
@@ -62,6 +87,20 @@ def described(name: str, node: ast.ClassDef | ast.FunctionDef) -> str:
     return text
 
 
+def module(name: str) -> str:
+    """The section of a module: its docstring, names of types, and classes; typed dictionaries with their keys."""
+    tree = ast.parse((PACKAGE / f"{name}.py").read_text(encoding="utf-8"))
+    text = f"## taut.{name}\n\n{doc(tree)}\n"
+    text += "".join(f"\n{field}" for field in fields(tree.body))
+    for node in tree.body:
+        if isinstance(node, ast.ClassDef):
+            text += "\n" + described(f"taut.{name}.{node.name}", node, "###")
+            keys = [ast.unparse(field) for field in node.body if isinstance(field, ast.AnnAssign)]
+            if any(ast.unparse(base) == "TypedDict" for base in node.bases):
+                text += "\n```text\n" + "\n".join(keys) + "\n```\n"
+    return text
+
+
 def main() -> None:
     """Prints all sections in the order of ``__all__``."""
     found: dict[str, ast.ClassDef | ast.FunctionDef] = {}
@@ -69,7 +108,9 @@ def main() -> None:
         for name, node in definitions(path).items():
             found.setdefault(name, node)
     for name in exported():
-        if name in found:
+        if (PACKAGE / f"{name}.py").is_file():
+            print(module(name))
+        elif name in found:
             print(described(name, found[name]))
 
 

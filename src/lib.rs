@@ -39,7 +39,6 @@
 //! dependence; each uses only those above it.
 //!
 //! - [`error`]: what is wrong, where, what is allowed, what to do next.
-//! - [`files`]: files that appear whole or not at all. [`number`]: numbers written for people.
 //! - [`quantity`]: `"19.4 mm"` becomes 0.0194, with the dimension checked. Everywhere else numbers are in SI units.
 //! - [`trajectory`]: columns with units, and their files.
 //! - [`friction`], [`machine`]: what the machine is.
@@ -61,12 +60,26 @@
 //! # Later versions
 //!
 //! Results, and enumerations that will get further variants, are `#[non_exhaustive]`: further fields and variants do not
-//! break a program that reads them. What a program makes itself (machines, experiments, signals, designs) is complete.
+//! break a program that reads them. What a program makes itself has a constructor for its necessary values, such as
+//! [`Machine::axis`](machine::Machine::axis), [`Motor::brushed`](machine::Motor::brushed),
+//! [`Experiment::new`](plan::Experiment::new), [`Design::new`](design::Design::new) and
+//! [`Setup::new`](control::Setup::new), or a `Default`; further fields can be set by `..`, and a version may add some:
+//!
+//! ```
+//! use taut::design::{Design, Pid, Structure};
+//!
+//! let pid = Pid { derivative: 10.0, ..Pid::new(2000.0) }; // V s/m, V/m
+//! let design = Design { limit: Some(12.0), ..Design::new(1e-3, Structure::Pid(pid)) }; // V, s
+//! # assert_eq!((design.limit, pid.filter), (Some(12.0), 200.0));
+//! ```
+//!
+//! Hidden modules are used by the program and its reports, and change without notice.
 //!
 //! # Features
 //!
-//! `parquet` adds Parquet files; `json` adds results as data. Without them the library is the physics alone. Figures
-//! and reports are a crate of their own, `taut-report`.
+//! `parquet` adds Parquet files; `json` adds results as data. Without them the library is the physics alone. A program
+//! that only simulates, without case files, needs `taut-core` alone. Figures and reports are a crate of their own,
+//! `taut-report`.
 
 #[cfg(feature = "json")]
 pub mod json;
@@ -75,12 +88,16 @@ pub mod reduction;
 pub mod stages;
 pub mod sweep;
 
-pub use taut_case::{case, files, log};
+#[doc(hidden)]
+pub use taut_case::files;
+pub use taut_case::{case, log};
 pub use taut_control::{control, frf, learning, linear, planning, tune};
 pub use taut_core::{
-    Error, Result, chance, design, error, friction, machine, measure, mechanism, metrics, number, parameter, plan,
-    polyline, quantity, reach, signal, solve,
+    Error, Result, design, error, friction, machine, measure, mechanism, metrics, parameter, plan, quantity, reach,
+    signal, solve,
 };
+#[doc(hidden)]
+pub use taut_core::{chance, number, polyline};
 pub use taut_export as export;
 pub use taut_identify::fit;
 

@@ -278,6 +278,16 @@ impl Known {
 }
 
 /// Measures the responses of all logs of a case, with fit and margins.
+///
+/// ```no_run
+/// use taut::case::Case;
+/// use taut::frf::{Cut, Known, measure};
+///
+/// let case = Case::read("axis.toml")?; // with logs
+/// let measured = measure(&case, &Cut::default(), Known::new(&case, None, None, None)?)?;
+/// println!("{} responses", measured.responses.len());
+/// # Ok::<(), taut::Error>(())
+/// ```
 pub fn measure(case: &Case, cut: &Cut, known: Known) -> Result<Measurement> {
     case.complete()?;
     let machine = &case.machine;

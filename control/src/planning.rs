@@ -112,6 +112,18 @@ pub struct Plans {
 }
 
 /// Plans the moves with these indices of the case; `stop` ends the search early, with the best so far.
+///
+/// ```no_run
+/// use taut::case::Case;
+/// use taut::planning::plan;
+/// use taut::reach::quickest::Wanted;
+///
+/// let case = Case::read("axis.toml")?; // with [controller] and [[move]]
+/// let wanted = Wanted { speed: Some(0.5), acceleration: None, jerk: None, reserve: 0.1 };
+/// let plans = plan(&case, &[0], &wanted, &|| false)?;
+/// println!("{} of {} machines", plans.moves.len(), plans.family.machines.len());
+/// # Ok::<(), taut::Error>(())
+/// ```
 pub fn plan(case: &Case, places: &[usize], wanted: &Wanted, stop: &dyn Fn() -> bool) -> Result<Plans> {
     let Some(design) = &case.controller else {
         return Err(Error::new("there is no controller that could follow a move").next("add [controller]"));

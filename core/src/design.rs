@@ -41,19 +41,24 @@ pub struct Bounds {
 }
 
 impl Design {
-    /// The design of steppers, which follow their references without feedback, through this shaper; `every` is the
-    /// interval between rows, s.
-    pub fn open_loop(every: f64, shaper: Vec<[f64; 2]>) -> Self {
+    /// This structure at a sample time in s, without delay, limit, feed-forward, observer, filters and shaper.
+    pub fn new(every: f64, structure: Structure) -> Self {
         Self {
             every,
             delay: 0.0,
             limit: None,
-            structure: Structure::OpenLoop(OpenLoop),
+            structure,
             feed_forward: FeedForward::NONE,
             disturbance_observer: None,
             filters: Vec::new(),
-            shaper,
+            shaper: Vec::new(),
         }
+    }
+
+    /// The design of steppers, which follow their references without feedback, through this shaper; `every` is the
+    /// interval between rows, s.
+    pub fn open_loop(every: f64, shaper: Vec<[f64; 2]>) -> Self {
+        Self { shaper, ..Self::new(every, Structure::OpenLoop(OpenLoop)) }
     }
 
     /// The limits that it sets itself.
@@ -144,6 +149,13 @@ pub struct Pid {
     pub tracking: f64,
 }
 
+impl Pid {
+    /// A proportional controller, V/m or A/m, with the defaults of a case file for the rest.
+    pub fn new(proportional: f64) -> Self {
+        Self { proportional, integral: 0.0, derivative: 0.0, filter: 200.0, reference_speed: 1.0, tracking: 0.05 }
+    }
+}
+
 /// Gains of a cascade.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Cascade {
@@ -161,6 +173,15 @@ pub struct Cascade {
     pub tracking: f64,
     /// The current loop; needs an amplifier in voltage mode.
     pub current: Option<CurrentLoop>,
+}
+
+impl Cascade {
+    /// Gains of the position loop, 1/s, and of the speed loop, V s/m or A s/m, with the defaults of a case file for the
+    /// rest.
+    pub fn new(position: f64, speed: f64) -> Self {
+        let (filter, reference_speed, tracking) = (200.0, 1.0, 0.02);
+        Self { position, speed, speed_integral: 0.0, filter, reference_speed, tracking, current: None }
+    }
 }
 
 /// A sampled current loop inside a cascade.

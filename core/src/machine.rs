@@ -14,7 +14,7 @@ mod swing;
 
 use crate::friction::Friction;
 pub use crate::mechanism::{Amplifier, AmplifierMode, GearPlay, Motor, Stepper};
-use crate::polyline::Polyline;
+pub use crate::polyline::Polyline;
 pub use geometry::{BodyAt, DriveAt, Geometry, Lever, Part, SlideAt, SpanAt};
 pub use kind::MachineKind;
 pub use measured::Quantity;
@@ -62,6 +62,45 @@ pub struct DriveUnit {
 }
 
 impl Machine {
+    /// An axis with equal pulleys at both ends, without encoders; `pulley_radius` in m.
+    ///
+    /// ```
+    /// use taut_core::friction::Friction;
+    /// use taut_core::machine::{Amplifier, AmplifierMode, Belt, DriveUnit, Machine, Motor, Pulley, Slide};
+    /// use taut_core::plan::Experiment;
+    /// use taut_core::signal::Signal;
+    /// use taut_core::solve::{Solver, simulate};
+    ///
+    /// let motor = Motor { rotor_inertia: 4.6e-6, ..Motor::brushed(0.043, 1.1) };
+    /// let drive = DriveUnit { motor, amplifier: Amplifier::ideal(AmplifierMode::Voltage, 1.0) };
+    /// let pulley = Pulley { inertia: 6.3e-5, friction: Friction::symmetric(0.0, 0.015) };
+    /// let cart = Slide::new(0.4, Friction::with_breakaway(19.0, 0.2, 0.3));
+    /// let belt = Belt::given([2e5, 2e5, 1e5], [20.0, 20.0, 20.0]);
+    /// let axis = Machine::axis(drive, 0.0194, pulley, cart, belt);
+    ///
+    /// let pulse = Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }; // V, s, s
+    /// let experiment = Experiment::new("5 V pulse", vec![pulse], 1.0, 1e-3);
+    /// let run = simulate(&axis, &experiment, Solver::Exact)?;
+    /// let cart = *run.trajectory.get("cart_position").unwrap().last().unwrap();
+    /// assert!(cart > 0.02 && cart < 0.1, "{cart} m");
+    /// # Ok::<(), taut_core::Error>(())
+    /// ```
+    pub fn axis(drive: DriveUnit, pulley_radius: f64, pulley: Pulley, cart: Slide, belt: Belt) -> Self {
+        Self {
+            kind: MachineKind::Axis,
+            drives: vec![drive],
+            pulley_radius,
+            drive_pulley: pulley,
+            idler_pulley: pulley,
+            bridge: None,
+            yaw: None,
+            cart,
+            belt,
+            encoder: None,
+            scale: None,
+        }
+    }
+
     /// The stepper of an axis or a gantry driven by steppers.
     pub fn stepper(&self) -> Option<&Stepper> {
         self.drives.iter().find_map(|unit| unit.motor.stepper.as_ref())
@@ -322,6 +361,13 @@ pub struct Travel {
     pub max: f64,
     /// The end stop there; without, a run ends when the cart leaves its travel.
     pub stop: Option<EndStop>,
+}
+
+impl Travel {
+    /// A travel without end stops.
+    pub fn new(min: f64, max: f64) -> Self {
+        Self { min, max, stop: None }
+    }
 }
 
 /// An elastic end stop.

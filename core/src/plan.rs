@@ -30,6 +30,12 @@ pub struct Experiment {
 }
 
 impl Experiment {
+    /// A run from rest at the origin, with an input for each drive, to the time `until` (s), with a row after each
+    /// interval `every` (s).
+    pub fn new(name: impl Into<String>, inputs: Vec<Signal>, until: f64, every: f64) -> Self {
+        Self { name: name.into(), inputs, until, every, initial: State::default(), log: None }
+    }
+
     /// Its name as a file name without ending: in lower case, with `-` for everything but letters and digits.
     pub fn file_name(&self) -> String {
         file_name(&self.name)

@@ -207,6 +207,16 @@ fn shaper_remark(design: &crate::design::Design) -> Vec<String> {
 }
 
 /// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::export::{Options, Real, Target, export};
+///
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let exported = export(&case, Target::C, "axis", &Options { real: Real::Float, ..Options::default() })?;
+/// assert!(exported.files.iter().any(|(name, _)| name == "axis.c"));
+/// # Ok::<(), taut::Error>(())
+/// ```
 pub fn export(case: &Case, target: Target, stem: &str, options: &Options) -> Result<Exported> {
     if target != Target::C {
         crate::case::needs_motors(&case.machine)?;

@@ -1,5 +1,6 @@
 //! Mistakes of the user as exceptions, with the text that the command line shows.
 
+use crate::spoken::{self, spoken};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -42,36 +43,15 @@ pub fn fail_as_a_bug(py: Python<'_>, told: String) -> PyResult<()> {
     unlocked(py, || panic!("{told}"))
 }
 
-/// A message of the library in Python's terms: `--move` becomes the argument `move=`. Commands of the command line are
-/// kept, and so is `--set`, a notation for changes.
-fn spoken(text: &str) -> String {
-    let mut spoken = String::with_capacity(text.len());
-    let mut rest = text;
-    while let Some(at) = rest.find("--") {
-        let (before, option) = (&rest[..at], &rest[at + 2..]);
-        let end = option.find(|c: char| !(c.is_ascii_alphanumeric() || c == '-')).unwrap_or(option.len());
-        let begins_a_word = before.chars().next_back().is_none_or(|c| !c.is_alphanumeric() && c != '-');
-        spoken.push_str(before);
-        let is_option = option.starts_with(|c: char| c.is_ascii_lowercase()) && begins_a_word;
-        match is_option && option[..end] != *"set" && !spoken.contains("taut ") {
-            true => spoken.push_str(&format!("{}=", option[..end].replace('-', "_"))),
-            false => spoken.push_str(&rest[at..at + 2 + end]),
-        }
-        rest = &option[end..];
-    }
-    spoken + rest
-}
-
 /// The exception for what the library says.
 pub fn told(py: Python<'_>, mut error: taut::Error) -> PyErr {
     error.what = spoken(&error.what);
     error.allowed = error.allowed.map(|text| spoken(&text));
     error.next = error.next.map(|text| spoken(&text));
     if let Some(place) = &mut error.place
-        && let Some(argument) =
-            place.file.to_str().and_then(|name| name.strip_prefix("--")).filter(|name| *name != "set")
+        && let Some(name) = place.file.to_str().and_then(spoken::place)
     {
-        place.file = argument.replace('-', "_").into();
+        place.file = name.into();
     }
     let exception = Error::new_err(error.to_string());
     match describe(exception.value(py), error) {

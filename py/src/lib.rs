@@ -16,6 +16,7 @@ mod logs;
 mod modes;
 mod runs;
 mod shape;
+mod spoken;
 mod sweep;
 mod value;
 

@@ -201,7 +201,7 @@ pub fn simulate(py: Python<'_>, case: &Arc<Case>, path: &Path, names: &[String],
 /// About as many columns as a run has.
 const COLUMNS: usize = 24;
 
-const FEWER: &str = "take a longer interval `every`, or write rows to a file as they come: taut simulate --out DIR";
+const FEWER: &str = "take a longer interval `every`, or write rows to a file as they come: `taut simulate --out DIR`";
 
 fn one(py: Python<'_>, case: &Arc<Case>, experiment: &Experiment, solver: Solver) -> PyResult<Run> {
     let machine = &case.machine;

@@ -1,7 +1,7 @@
 """Cases: read, edited, saved, and mistakes told."""
 
+import functools
 import os
-import re
 import pickle
 import zipfile
 from pathlib import Path
@@ -65,7 +65,7 @@ def test_mistakes_are_told_as_on_the_command_line(case):
     with pytest.raises(taut.Error) as caught:
         case["cart.mass"] = "0.5 m"
     assert str(caught.value) == (
-        '--set:1:11: cart.mass: "0.5 m" is a length (m); expected a mass (kg)\n'
+        'change:1:11: cart.mass: "0.5 m" is a length (m); expected a mass (kg)\n'
         '  1 | cart.mass="0.5 m"\n'
         "    |           ^^^^^^^\n"
         '  next: write for example mass = "0.362 kg"'
@@ -91,11 +91,10 @@ def mistake(path):
 
 
 def spoken(text):
-    """A message of the command line with options as arguments of Python; commands stay, and so do lines of the file."""
-    def argument(line):
-        name = lambda found: found[0] if "taut " in line[: found.start()] else found[1].replace("-", "_") + "="
-        return re.sub(r"(?<![\w-])--(?!set\b)([a-z][a-z0-9-]*)", name, line)
-    return "".join(line if " | " in line else argument(line) for line in text.splitlines(keepends=True))
+    """A message of the command line in Python's terms, as far as the wrong cases need it; lines of the file stay."""
+    terms = [("`taut init`", "`taut.template()`"), ("`taut fit`", "`case.fit()`"), ("give --runs", "give n=")]
+    lines = text.splitlines(keepends=True)
+    return "".join(line if " | " in line else functools.reduce(lambda told, term: told.replace(*term), terms, line) for line in lines)
 
 
 @pytest.mark.skipif("TAUT_BAD" not in os.environ, reason="TAUT_BAD names no folder that `cargo xtask bad` wrote")

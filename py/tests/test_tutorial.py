@@ -34,8 +34,9 @@ def test_what_is_measured_is_the_output_of_its_script(root, document, output):
     assert measured in (root / "docs" / document).read_text(encoding="utf-8")
 
 
-def test_docstrings_of_the_package():
-    assert doctest.testmod(taut, optionflags=doctest.ELLIPSIS).failed == 0
+@pytest.mark.parametrize("module", [taut, taut.controllers])
+def test_docstrings_of_the_package(module):
+    assert doctest.testmod(module, optionflags=doctest.ELLIPSIS).failed == 0
 
 
 def test_everything_has_a_docstring():
@@ -48,5 +49,5 @@ def test_everything_has_a_docstring():
         and not (getattr(taut, name) if member is None else getattr(getattr(taut, name), member)).__doc__
     ]
     # Names of types in `types` have a string below them, which Python does not keep.
-    fields = {"Estimate", "Fit", "Check", "LinearModel", "Modes", "types"}
+    fields = {"Estimate", "Fit", "Check", "LinearModel", "Modes", "controllers", "moves", "types"}
     assert [entry for entry in missing if entry.split(".")[0] not in fields] == []

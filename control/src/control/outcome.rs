@@ -56,7 +56,31 @@ pub struct Setup<'a> {
     pub solver: Solver,
 }
 
+impl<'a> Setup<'a> {
+    /// A controller that assumes the machine itself, on references from time zero to `until` (s), with the window of a
+    /// case file.
+    pub fn new(machine: &'a Machine, design: &'a Design, profiles: &'a [Profile], until: f64) -> Self {
+        Self { machine, model: machine, design, profiles, until, window: 1e-4, solver: Solver::for_machine(machine) }
+    }
+}
+
 /// Runs a design along a profile: a pure function at the cost of a run of the axis, so that a search can call it often.
+///
+/// ```
+/// use taut::case::{Case, TEMPLATE};
+/// use taut::control::{Setup, closed_loop};
+/// use taut::design::{Design, Pid, Structure};
+/// use taut::signal::profile::{Leg, Limits, Profile};
+///
+/// let case = Case::from_text("axis.toml", TEMPLATE)?;
+/// let path = [Profile::new(0.0, &[Leg::To(0.05, Limits::new(0.3, 5.0))])?]; // m, m/s, m/s²
+/// let pid = Pid { derivative: 10.0, ..Pid::new(2000.0) }; // V s/m, V/m
+/// let design = Design { limit: Some(12.0), ..Design::new(1e-3, Structure::Pid(pid)) }; // V, s
+/// let run = closed_loop(&Setup::new(&case.machine, &design, &path, 0.6))?;
+/// let error = run.figures.cart().error.peak.value.abs();
+/// assert!(error > 1e-3 && error < 5e-3, "{error} m");
+/// # Ok::<(), taut::Error>(())
+/// ```
 pub fn closed_loop(setup: &Setup) -> Result<MoveRun> {
     let &Setup { machine, model, design, profiles, until, window, solver } = setup;
     let shaped = design.shaped(profiles);

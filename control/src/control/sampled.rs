@@ -88,6 +88,13 @@ pub struct Loop {
     pub lead: f64,
 }
 
+impl Loop {
+    /// A loop of this sample time, s, without delay, limit and lead.
+    pub fn sampled(every: f64) -> Self {
+        Self { every, delay: 0.0, limit: None, lead: 0.0 }
+    }
+}
+
 /// A stored sample of a controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]

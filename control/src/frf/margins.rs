@@ -72,11 +72,11 @@ pub fn measured(
         let (omega, terms) = (*omega, feedback.at(*omega));
         if terms.current != Complex::ZERO {
             return Err(Error::new("a current loop needs the response of the current, too")
-                .next("leave its margins to taut tune"));
+                .next("leave its margins to `taut tune`"));
         }
         if terms.scale != Complex::ZERO {
             return Err(Error::new("a controller with two sensors needs the responses of both")
-                .next("leave its margins to taut tune"));
+                .next("leave its margins to `taut tune`"));
         }
         let factor = terms.position / terms.own * Complex::from_polar(length, -omega * late);
         let difference = DMatrix::identity(matrix.len(), matrix.len()) + g * factor;

@@ -292,18 +292,8 @@ impl SimpleDrive {
     ///
     /// With R = 1 ohm, K_t = k_F r and K_e = d r / k_F, the force K_t (u − K_e v / r) / (R r) is k_F u − d v.
     pub fn motor(self, r: f64) -> Motor {
-        Motor {
-            torque_constant: self.force * r,
-            back_emf_constant: self.drag * r / self.force,
-            resistance: 1.0,
-            inductance: 0.0,
-            rotor_inertia: 0.0,
-            gear_ratio: 1.0,
-            gear_efficiency: 1.0,
-            gear_play: None,
-            is_simple: true,
-            stepper: None,
-        }
+        let back_emf_constant = self.drag * r / self.force;
+        Motor { back_emf_constant, is_simple: true, ..Motor::brushed(self.force * r, 1.0) }
     }
 
     /// The simple drive that `motor` represents, if any.

@@ -28,6 +28,23 @@ pub struct Motor {
 }
 
 impl Motor {
+    /// A brushed motor at the drive pulley with a back-EMF constant equal to its torque constant (N m/A = V s/rad), and
+    /// without inductance, rotor inertia and gear.
+    pub fn brushed(torque_constant: f64, resistance: f64) -> Self {
+        Self {
+            torque_constant,
+            back_emf_constant: torque_constant,
+            resistance,
+            inductance: 0.0,
+            rotor_inertia: 0.0,
+            gear_ratio: 1.0,
+            gear_efficiency: 1.0,
+            gear_play: None,
+            is_simple: false,
+            stepper: None,
+        }
+    }
+
     /// Holding torque of a stepper with both phases at rated current, N m: T_h = √2 K_m I.
     pub fn holding_torque(&self) -> Option<f64> {
         self.stepper.map(|stepper| self.torque_constant * stepper.amplitude())

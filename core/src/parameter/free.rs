@@ -126,7 +126,7 @@ impl Free {
             return Err(Error::new(format!(
                 "`{name}` is a sum over the bodies of a single axis, and this is a gantry"
             ))
-            .next("name a number of the gantry as --set does, such as cart.mass or bridge.friction.viscous"));
+            .next("name a number of the gantry by its key, such as cart.mass or bridge.friction.viscous"));
         }
         let Some(sum) = Sum::named(name) else {
             return Err(Error::new(format!("there is no group `{name}`")).allowed(Sum::ALL.map(Sum::name).join(", ")));
@@ -368,7 +368,7 @@ fn numbers(machine: &Machine, key: &str, free: &[&str]) -> Result<(Vec<Number>, 
         Sits::Elsewhere => {
             return Err(Error::new(format!("`{key}` is not a number of the machine"))
                 .allowed("numbers of motor, amplifier, pulleys, cart, belt, travel and encoder")
-                .next("name one of them as --set does, such as cart.mass or cart.friction.viscous"));
+                .next("name one of them by its key, such as cart.mass or cart.friction.viscous"));
         }
     };
     let whole = row.key == key && list.has_whole();
@@ -440,7 +440,7 @@ fn unknown(machine: &Machine, key: &str) -> Error {
     match near {
         Some(near) => error.next(format!("did you mean `{near}`?")),
         None if machine.bridge.is_some() => error,
-        None => error.next("name a machine's number as --set does, such as cart.mass or cart.friction.viscous"),
+        None => error.next("name a machine's number by its key, such as cart.mass or cart.friction.viscous"),
     }
 }
 

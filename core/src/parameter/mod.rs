@@ -359,6 +359,7 @@ pub fn check(machine: &Machine) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::design::{Cascade, Pid};
     use crate::quantity;
 
     #[test]
@@ -370,6 +371,25 @@ mod tests {
             if let Fallback::Value(value) = p.default {
                 assert!(p.range.contains(value), "{}", p.key);
             }
+        }
+    }
+
+    #[test]
+    fn constructors_of_gains_have_the_defaults_of_a_case_file() {
+        let (pid, cascade) = (Pid::new(1.0), Cascade::new(1.0, 1.0));
+        let rows = [
+            ("pid.integral", pid.integral),
+            ("pid.derivative", pid.derivative),
+            ("pid.filter", pid.filter),
+            ("pid.reference_speed", pid.reference_speed),
+            ("pid.tracking", pid.tracking),
+            ("cascade.speed_integral", cascade.speed_integral),
+            ("cascade.filter", cascade.filter),
+            ("cascade.reference_speed", cascade.reference_speed),
+            ("cascade.tracking", cascade.tracking),
+        ];
+        for (key, value) in rows {
+            assert_eq!(default_of(&format!("controller.{key}")), Some(value), "{key}");
         }
     }
 

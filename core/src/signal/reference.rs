@@ -15,6 +15,13 @@ pub struct Limits {
     pub snap: Option<f64>,
 }
 
+impl Limits {
+    /// Limits of a trapezoid: neither jerk nor snap is limited.
+    pub fn new(speed: f64, acceleration: f64) -> Self {
+        Self { speed, acceleration, jerk: None, snap: None }
+    }
+}
+
 /// Reference position of the cart and its first four derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Reference<N = f64> {

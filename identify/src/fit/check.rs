@@ -47,6 +47,18 @@ impl Check {
 }
 
 /// Checks the logs of a case by a fit.
+///
+/// ```no_run
+/// use taut::case::Case;
+/// use taut::fit::check;
+///
+/// let case = Case::read("axis.toml")?; // with logs and [fit]
+/// let checked = check(&case, &case.fit.clone().unwrap_or_default())?;
+/// for (_, choices) in checked.groups() {
+///     println!("the logs do not distinguish {}", choices.join(", "));
+/// }
+/// # Ok::<(), taut::Error>(())
+/// ```
 pub fn check(case: &Case, plan: &Plan) -> Result<Check> {
     check_watched(case, plan, None, &mut |_, _| Flow::Continue)
 }

@@ -61,6 +61,20 @@ use trust::nearest::search;
 /// Finds the parameters of `plan` from the logs of `case`.
 ///
 /// `watch` receives the cost after each step; `stop` ends the search, which then returns the best point so far.
+///
+/// ```no_run
+/// use taut::case::Case;
+/// use taut::fit::fit;
+/// use taut::solve::Flow;
+///
+/// let case = Case::read("axis.toml")?; // with logs and [fit]
+/// let plan = case.fit.clone().unwrap_or_default();
+/// let found = fit(&case, &plan, None, &mut |_| Flow::Continue)?;
+/// for estimate in &found.estimates {
+///     println!("{} = {} ± {:?} {}", estimate.name, estimate.value, estimate.error, estimate.unit);
+/// }
+/// # Ok::<(), taut::Error>(())
+/// ```
 pub fn fit(case: &Case, plan: &Plan, stop: Option<Stop>, watch: &mut dyn FnMut(f64) -> Flow) -> Result<Fit> {
     fit_watched(case, plan, stop, &mut |_, cost| watch(cost))
 }

@@ -11,7 +11,7 @@ Mistakes are :class:`taut.Error`, a ``ValueError`` with the text that the comman
 """
 
 from ._native import Bug, Error, Observation, __version__
-from . import types
+from . import controllers, moves, types
 from .case import Case, export, read, show, template
 from .results import Check, Comparison, Designed, Drift, Estimate, Fit, FitLog, ForceMap, FrequencyResponses, Learned, LinearModel, Modes, Plans, Shown, Tuned
 from .runs import Run, Runs
@@ -44,7 +44,9 @@ __all__ = [
     "Table",
     "Tuned",
     "__version__",
+    "controllers",
     "export",
+    "moves",
     "read",
     "shape",
     "show",

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ._checks import text
+from ._parts import CasePart
 
 
 DEEPEST = 32
@@ -15,9 +16,11 @@ DEEPEST = 32
 
 
 def written(value: Any, depth: int = 0) -> str:
-    """The value in TOML: numbers are SI, texts may carry a unit, lists and dictionaries hold these."""
+    """The value in TOML: numbers are SI, texts may carry a unit, lists, dictionaries and parts of a case hold these."""
     if depth > DEEPEST:
         raise ValueError(f"lists and dictionaries hold each other more than {DEEPEST} deep")
+    if isinstance(value, CasePart):
+        value = value.table()
     if hasattr(value, "tolist"):  # NumPy's scalars and arrays
         value = value.tolist()
     if isinstance(value, bool):
@@ -47,4 +50,6 @@ def key_text(key: str) -> str:
 
 def change(key: str, value: Any) -> str:
     """``KEY=VALUE``, as ``--set`` takes it."""
+    if key == "":
+        raise ValueError('key: expected the key of a value, such as "cart.mass"')
     return f"{text('key', key)}={text(key, written(value))}"

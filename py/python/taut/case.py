@@ -12,6 +12,7 @@ from ._logs import write_log
 from ._toml import change
 from ._toml import written as toml
 from .results import Check, Comparison, Designed, Drift, Fit, FitLog, ForceMap, FrequencyResponses, Learned, LinearModel, Modes, Plans, Shown, Tuned
+from .controllers import Controller
 from .runs import Run, Runs
 from .sweeps import sweep
 from .table import Table
@@ -19,10 +20,10 @@ from .table import Table
 if TYPE_CHECKING:
     from distributed import Client
 
-    from .types import Criterion, Hold, Method, Part, Real, Solver, SweepDesign, Target
+    from .types import Criterion, Excitation, Hold, Law, Method, Part, Real, Solver, SweepDesign, SweepSolver, Target
 
 
-class Controller(Protocol):
+class OwnController(Protocol):
     """A controller of one's own.
 
     It may also have ``reset()``, called before a move, and ``limited(given)``, told after each sample what the limit
@@ -34,7 +35,7 @@ class Controller(Protocol):
         ...
 
 
-OneController: TypeAlias = "Controller | Callable[[float, float], float]"
+OneController: TypeAlias = "OwnController | Callable[[float, float], float]"
 """A controller of one's own, or a function of the measured position and the reference, m."""
 
 
@@ -220,7 +221,7 @@ class Case:
         self,
         names: Sequence[str] | None = None,
         *,
-        inputs: Sequence[str] | None = None,
+        inputs: Sequence[Excitation] | None = None,
         drives: Sequence[str] | None = None,
         criterion: Criterion = "d",
         duration: float = 4.0,
@@ -373,7 +374,7 @@ class Case:
         return logged
 
     def compare(
-        self, laws: str | Sequence[str] | None = None, windows: Sequence[float | None] | None = None
+        self, laws: Law | Sequence[Law] | None = None, windows: Sequence[float | None] | None = None
     ) -> Comparison:
         """Friction laws and windows by the error on parts of the logs that are held out, and a fit with the best.
 
@@ -429,7 +430,7 @@ class Case:
         self,
         move: str,
         *,
-        controller: OneController | list[OneController] | tuple[OneController, ...] | None = None,
+        controller: Controller | OneController | list[OneController] | tuple[OneController, ...] | None = None,
         every: float | None = None,
         delay: float | None = None,
         limit: float | None = None,
@@ -440,7 +441,7 @@ class Case:
         self,
         move: list[str] | tuple[str, ...] | None = None,
         *,
-        controller: OneController | list[OneController] | tuple[OneController, ...] | None = None,
+        controller: Controller | OneController | list[OneController] | tuple[OneController, ...] | None = None,
         every: float | None = None,
         delay: float | None = None,
         limit: float | None = None,
@@ -450,7 +451,7 @@ class Case:
         self,
         move: str | list[str] | tuple[str, ...] | None = None,
         *,
-        controller: OneController | list[OneController] | tuple[OneController, ...] | None = None,
+        controller: Controller | OneController | list[OneController] | tuple[OneController, ...] | None = None,
         every: float | None = None,
         delay: float | None = None,
         limit: float | None = None,
@@ -460,10 +461,15 @@ class Case:
 
         ``controller`` is a function of the measured position and the reference (m), or an object with ``step(seen)``;
         it returns the command (V or A) and is called once a sample; of a gantry a list of them, one for each drive, each
-        of which is given its part of the belt. ``every`` (sample time, s), ``delay`` (from sample
-        to command, s) and ``limit`` (of the command) are the case's unless said. What it raises comes out here.
-        ``spread`` also tries the case's controller with each parameter off by this share.
+        of which is given its part of the belt. ``every`` (sample time, s), ``delay`` (from sample to command, s) and
+        ``limit`` (of the command) are the case's unless given. What it raises comes out here. A
+        :class:`taut.controllers.Controller` replaces that of the case. ``spread`` also tries the case's controller with
+        each parameter off by this share.
         """
+        if isinstance(controller, Controller):
+            case, controller = self.changed({"controller": controller}), None
+        else:
+            case = self
         if controller is None and (every, delay, limit) != (None, None, None):
             raise TypeError("every, delay and limit go with a controller of your own; the case's are in [controller]")
         if controller is not None and spread is not None:
@@ -471,7 +477,7 @@ class Case:
         names = _checks.names("move", [move] if isinstance(move, str) else move)
         timing = (_checks.number("every", every), _checks.number("delay", delay), _checks.number("limit", limit))
         share = _checks.number("spread", spread)
-        runs = [Run(run) for run in self._native.run_moves(names, controller, timing, share)]
+        runs = [Run(run) for run in case._native.run_moves(names, controller, timing, share)]
         return runs[0] if isinstance(move, str) else Runs(runs)
 
     def sweep(
@@ -484,7 +490,7 @@ class Case:
         indices: bool = False,
         interval: str | float | None = None,
         figures: Sequence[str] | None = None,
-        solver: Literal["lanes", "exact"] | None = None,
+        solver: SweepSolver | None = None,
         threads: int = 0,
         client: Client | None = None,
         chunk: int | None = None,

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from .types import Firmware
+    from .types import Direction, DriveState, Firmware
 
 
 @dataclass(frozen=True)
@@ -93,14 +93,14 @@ def shape(
     *,
     together: bool = False,
     firmware: Firmware = "klipper",
-    axis: str | None = None,
+    axis: Direction | None = None,
     damping: float | str | None = None,
     max_smoothing: float | None = None,
     max_vibrations: float | None = None,
     corner_speed: float | None = None,
     shapers: Iterable[str] | None = None,
     uncertainty: float | None = None,
-    motor: str | None = None,
+    motor: DriveState | None = None,
     pairs: bool = False,
     belts: bool = False,
     changes: Mapping[str, Any] | None = None,

@@ -8,7 +8,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from . import _checks, _native
 from ._optional import needed
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pyarrow
     from distributed import Client
 
-    from .types import SweepDesign
+    from .types import SweepDesign, SweepSolver
 
     from .case import Case
 
@@ -39,7 +39,7 @@ def sweep(
     indices: bool = False,
     interval: str | float | None = None,
     figures: Sequence[str] | None = None,
-    solver: Literal["lanes", "exact"] | None = None,
+    solver: SweepSolver | None = None,
     threads: int = 0,
     client: Client | None = None,
     chunk: int | None = None,
@@ -81,7 +81,7 @@ def sweep_tables(
     indices: bool = False,
     interval: str | float | None = None,
     figures: Sequence[str] | None = None,
-    solver: Literal["lanes", "exact"] | None = None,
+    solver: SweepSolver | None = None,
     client: Client,
     chunk: int | None = None,
 ) -> Iterator[pyarrow.Table]:

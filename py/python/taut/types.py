@@ -16,6 +16,21 @@ Hold = Literal["zero", "first", "tustin"]
 Criterion = Literal["d", "a"]
 """Criteria of ``Case.design``."""
 
+Excitation = Literal["trapezoid", "sweep", "chirp", "multisine", "prbs"]
+"""Inputs that ``Case.design`` chooses among."""
+
+Law = Literal["viscous", "coulomb", "asymmetric", "stribeck", "along", "force-along", "force-by-speed", "lugre"]
+"""Friction laws that ``Case.compare`` compares."""
+
+Direction = Literal["x", "y", "z"]
+"""Directions of an accelerometer."""
+
+DriveState = Literal["held", "free"]
+"""How the motor behaves while the cart vibrates."""
+
+SweepSolver = Literal["lanes", "exact"]
+"""Solvers of sweeps: machines side by side, or one by one."""
+
 SweepDesign = Literal["random", "latin-hypercube", "sobol", "grid", "one-at-a-time"]
 """How a sweep draws machines."""
 

@@ -92,8 +92,20 @@ fn published() -> Result<(Vec<Published>, Vec<String>), String> {
     let text = |package: &Value, key: &str| package[key].as_str().unwrap_or_default().to_string();
     let (published, others): (Vec<Value>, Vec<Value>) =
         members()?.into_iter().partition(|package| package["publish"].is_null());
+    if let Some((name, key)) = published.iter().find_map(|one| Some((text(one, "name"), missing(one)?))) {
+        return Err(format!("{name} has no {key} in its manifest"));
+    }
     let published = published.iter().map(|package| (text(package, "name"), text(package, "version"))).collect();
     Ok((published, others.iter().map(|package| text(package, "name")).collect()))
+}
+
+/// The first key that a registry shows and a package lacks.
+fn missing(package: &Value) -> Option<&'static str> {
+    let is_empty = |key: &&str| match &package[*key] {
+        Value::Array(words) => words.is_empty(),
+        word => word.as_str().is_none_or(str::is_empty),
+    };
+    ["description", "license", "readme", "keywords", "categories", "rust_version"].into_iter().find(is_empty)
 }
 
 /// The program installed from that registry, and whether it is one that an earlier run installed from the same
@@ -137,6 +149,18 @@ fn installed(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_manifest_that_lacks_a_key_is_found() {
+        let whole = json!({ "description": "a", "license": "MIT", "readme": "README.md", "keywords": ["a"],
+            "categories": ["science"], "rust_version": "1.95" });
+        assert_eq!(missing(&whole), None);
+        let mut without = whole.clone();
+        without["keywords"] = json!([]);
+        assert_eq!(missing(&without), Some("keywords"));
+        without["license"] = Value::Null;
+        assert_eq!(missing(&without), Some("license"));
+    }
 
     #[test]
     fn what_is_kept_depends_on_files_and_not_on_the_commit() {

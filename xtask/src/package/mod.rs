@@ -5,6 +5,7 @@
 //! - The program for a glibc of 2.17 and later, with completions, manual pages, the licences of all packages in it and
 //!   a bill of materials (CycloneDX), in one archive.
 //! - The Python wheel, for the same C library, installed into empty environments.
+//! - The interface of the libraries, which may change only as far as the version allows since the last release.
 //!
 //! The two programs and the wheel must give equal results. A run that failed can be repeated: what was built from the
 //! same source is kept in `target/package-work`. The run ends with a list of its results, each with its figure, and of
@@ -12,6 +13,7 @@
 
 mod crates;
 mod glibc;
+mod interface;
 mod others;
 mod paths;
 mod program;
@@ -27,8 +29,8 @@ use std::process::Command;
 
 pub use paths::flags;
 
-pub const USAGE: &str = "cargo xtask package [--part crates|program|wheel]... [--target TRIPLE] [--twice] \
-                         [--python PROGRAM]... [--fresh]";
+pub const USAGE: &str = "cargo xtask package [--part interface|crates|program|wheel]... [--since COMMIT] \
+                         [--target TRIPLE] [--twice] [--python PROGRAM]... [--fresh]";
 
 /// Packages of Python that have to be installed, to the digit.
 const REQUIREMENTS: &str = "xtask/requirements.txt";
@@ -37,9 +39,11 @@ const REQUIREMENTS: &str = "xtask/requirements.txt";
 const GLIBC: (u32, u32) = (2, 17);
 
 /// Arguments of the command.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 struct Asked {
     parts: Vec<Part>,
+    /// The commit whose interface is compared with; none: the last release.
+    since: Option<String>,
     /// The target of program and wheel; none: this machine.
     target: Option<String>,
     /// True if the program is built a second time in another folder, and both builds must be equal byte by byte.
@@ -52,6 +56,7 @@ struct Asked {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Part {
+    Interface,
     Crates,
     Program,
     Wheel,
@@ -113,6 +118,7 @@ pub fn run(words: &[&str]) -> Result<(), String> {
     let mut programs = Vec::new();
     for part in &asked.parts {
         match part {
+            Part::Interface => interface::make(asked.since.as_deref(), &mut claims)?,
             Part::Crates => programs.push(crates::make(&places, &mut claims)?),
             Part::Program => {
                 let build = program::Build { places: &places, triple: &triple, compiler: &compiler };
@@ -140,7 +146,7 @@ pub fn run(words: &[&str]) -> Result<(), String> {
 
 impl Asked {
     fn new(words: &[&str]) -> Result<Self, String> {
-        let mut asked = Self { parts: Vec::new(), target: None, twice: false, pythons: Vec::new(), fresh: false };
+        let mut asked = Self::default();
         let mut words = words.iter();
         while let Some(word) = words.next() {
             match (*word, words.as_slice().first().copied()) {
@@ -148,6 +154,8 @@ impl Asked {
                 ("--fresh", _) => asked.fresh = true,
                 ("--target", Some(triple)) => asked.target = Some(triple.to_string()),
                 ("--python", Some(program)) => asked.pythons.push(program.to_string()),
+                ("--since", Some(commit)) => asked.since = Some(commit.to_string()),
+                ("--part", Some("interface")) => asked.parts.push(Part::Interface),
                 ("--part", Some("crates")) => asked.parts.push(Part::Crates),
                 ("--part", Some("program")) => asked.parts.push(Part::Program),
                 ("--part", Some("wheel")) => asked.parts.push(Part::Wheel),
@@ -159,9 +167,9 @@ impl Asked {
         }
         if asked.parts.is_empty() {
             asked.parts = match asked.target {
-                // The crates are the same for every target.
+                // Interface and crates are the same for every target.
                 Some(_) => vec![Part::Program, Part::Wheel],
-                None => vec![Part::Crates, Part::Program, Part::Wheel],
+                None => vec![Part::Interface, Part::Crates, Part::Program, Part::Wheel],
             };
         }
         Ok(asked)
@@ -227,13 +235,13 @@ mod tests {
 
     #[test]
     fn words_are_understood_or_refused() {
-        let nothing = Asked { parts: Vec::new(), target: None, twice: false, pythons: Vec::new(), fresh: false };
-        let all = vec![Part::Crates, Part::Program, Part::Wheel];
-        assert_eq!(Asked::new(&[]), Ok(Asked { parts: all, ..nothing }));
-        let words =
-            ["--part", "program", "--twice", "--target", "aarch64-unknown-linux-gnu", "--python", "p", "--fresh"];
+        let all = vec![Part::Interface, Part::Crates, Part::Program, Part::Wheel];
+        assert_eq!(Asked::new(&[]), Ok(Asked { parts: all, ..Asked::default() }));
+        let words = "--part program --since v0.1.0 --twice --target aarch64-unknown-linux-gnu --python p --fresh";
+        let words: Vec<&str> = words.split(' ').collect();
         let asked = Asked {
             parts: vec![Part::Program],
+            since: Some("v0.1.0".into()),
             target: Some("aarch64-unknown-linux-gnu".into()),
             twice: true,
             pythons: vec!["p".into()],
@@ -242,9 +250,9 @@ mod tests {
         assert_eq!(Asked::new(&words), Ok(asked));
         let of_target = Asked::new(&["--target", "aarch64-unknown-linux-gnu"]).unwrap();
         assert_eq!(of_target.parts, [Part::Program, Part::Wheel]);
-        for wrong in [&["--part"][..], &["--part", "all"], &["--target"], &["twice"], &["--python"], &["--fresh", "a"]]
-        {
-            assert!(Asked::new(wrong).unwrap_err().contains("is not understood"), "{wrong:?}");
+        for wrong in ["--part", "--part all", "--target", "twice", "--python", "--fresh a", "--since"] {
+            let wrong: Vec<&str> = wrong.split(' ').collect();
+            assert!(Asked::new(&wrong).unwrap_err().contains("is not understood"), "{wrong:?}");
         }
     }
 
