@@ -253,7 +253,7 @@ pub fn drawn(seed: u64, lacks: Lacks) -> Drawn {
             behind_play(&mut angle, size, chance.uniform());
         }
         let factor = if lacks == Lacks::Scale && index == drive { size } else { 1.0 };
-        let read = |phi: f64, chance: &mut Chance| COUNT * (factor * phi / COUNT + 0.3 * chance.normal()).floor();
+        let read = |phi: f64, chance: &mut Chance| COUNT * (factor * phi / COUNT + 0.1 * chance.normal()).floor();
         outputs.push(output(quantity, angle.iter().map(|&phi| read(phi, &mut chance)).collect()));
     }
     // The model: frictions and belts as the file has them, without a breakaway.

@@ -536,7 +536,10 @@ pub(super) fn prior_of(kind: &str, field: &Field, key: &str) -> Result<Prior> {
 fn nuisances(table: &Table, machine: &Machine, experiments: &[Experiment], whole: bool) -> Result<Nuisances> {
     let Some(field) = table.optional("nuisance") else { return Ok(Nuisances::default()) };
     let table = field.table()?;
-    table.check_keys(&["delay", "drive_delay", "input_gain", "input_offset", "initial_state", "bias", "sensor_play"], &[])?;
+    table.check_keys(
+        &["delay", "drive_delay", "input_gain", "input_offset", "initial_state", "bias", "sensor_play"],
+        &[],
+    )?;
     let flag = |key: &str| match table.optional(key) {
         None => Ok(false),
         Some(field) => match &field.node.kind {
@@ -571,9 +574,9 @@ fn nuisances(table: &Table, machine: &Machine, experiments: &[Experiment], whole
 /// The drive of a gantry that a field names by its side.
 fn drive(field: &Field, machine: &Machine) -> Result<usize> {
     if machine.has_one_coordinate() {
-        return Err(field.fail("this names one of several drives, and an axis has one").next(
-            "write delay = \"shared\", or delay = true for a delay of each log",
-        ));
+        return Err(field
+            .fail("this names one of several drives, and an axis has one")
+            .next("write delay = \"shared\", or delay = true for a delay of each log"));
     }
     field.choice(&machine.geometry().sides().zip(0..).collect::<Vec<_>>())
 }

@@ -378,8 +378,10 @@ fn numbers(machine: &Machine, key: &str, free: &[&str]) -> Result<(Vec<Number>, 
         // A single number has no elements, or a list not as many.
         return Err(match list {
             List::None | List::Drives(_) | List::Slides => unknown(machine, key),
-            List::Numbers | List::Points | List::SlidePoints(_) => Error::new(format!("`{key}` does not exist: there are {count}"))
-                .allowed(format!("{} to {}", list.key(row.key, 0), list.key(row.key, count - 1))),
+            List::Numbers | List::Points | List::SlidePoints(_) => Error::new(format!(
+                "`{key}` does not exist: there are {count}"
+            ))
+            .allowed(format!("{} to {}", list.key(row.key, 0), list.key(row.key, count - 1))),
         });
     }
     if whole && matches!(list, List::Drives(_)) {

@@ -5,10 +5,11 @@
 
 use super::extension::{Extended, Fitted, Measure, Rubs, Said, Site, Telling, friction_of, shown, slide_of};
 use crate::fit::limits::{
-    BREAKAWAY_FIRST, DRAG_POINTS, FORCE_FIRST, FORCE_MOST, LEAST_BREAKAWAY, MOST_BREAKAWAY, STRIBECK_POINTS, STRIBECK_SHARES,
+    BREAKAWAY_FIRST, DRAG_POINTS, FORCE_FIRST, FORCE_MOST, LEAST_BREAKAWAY, MOST_BREAKAWAY, STRIBECK_POINTS,
+    STRIBECK_SHARES,
 };
-use crate::friction::Law;
 use crate::fit::trust::doubts::falling;
+use crate::friction::Law;
 use crate::machine::Machine;
 use crate::polyline::Polyline;
 
@@ -87,8 +88,7 @@ fn drag(site: &Site, slide: &str) -> Option<Extended> {
 pub(super) fn drag_words(site: &Site, extended: &Extended, found: &Fitted) -> Said {
     let (per, slide) = (extended.size.map_or(0.0, |size| size.per), slide(site, extended));
     let c = per * found.value;
-    let words =
-        format!("a drag{} of {} times the square of the speed", whose(site, slide), shown(c, "N s^2/m^2"));
+    let words = format!("a drag{} of {} times the square of the speed", whose(site, slide), shown(c, "N s^2/m^2"));
     let mut machine = found.machine.clone();
     let most = line_of(&mut machine, slide).and_then(|line| line.points().last()).map_or(0.0, |point| point[0]);
     let point = |share: f64| {

@@ -12,9 +12,10 @@
 //! parts of the logs predicts the other parts better. With the distance d of the estimates from those with it,
 //! intervals of half-width h become √(h² + 2 (d² + h′²)) ≥ d + h′, h′ that of the fit with the element.
 //!
-//! A machine of several coordinates swings out of step with a log that a wrong model cannot follow, and its fit ends
-//! anywhere. Where it does not end within the noise, elements begin with the values of the case and a search in
-//! windows, as the fit itself did, row by row, until one leaves noise.
+//! On a machine of several coordinates, each drive, sensor or slide may have an element: the linear model predicts the
+//! costs of all, and only those with the least take steps. Such a machine swings out of step with a log that a wrong
+//! model cannot follow, and its fit ends anywhere. Where it does not end within the noise, elements are ranked and begin
+//! in short windows, from a fit with the values of the case, until one leaves noise.
 
 mod amplifier;
 mod apart;

@@ -69,9 +69,7 @@ fn in_windows<'a>(site: &Site<'_, 'a>, extended: &Extended) -> Option<(Problem<'
     let mut start = begin(&problem, &extended.telling, (&windows.problem, &windows.x))?;
     for (j, own) in problem.parameters.iter().enumerate() {
         let known = windows.problem.parameters.iter().position(|other| other.name == own.name);
-        start[j] = known.map_or(start[j], |known| {
-            problem.variable(j, windows.problem.value(known, windows.x[known]))
-        });
+        start[j] = known.map_or(start[j], |known| problem.variable(j, windows.problem.value(known, windows.x[known])));
     }
     let bounds = problem.bounds();
     let best = Minimum::linearised(&mut problem, &start, &bounds)?;
