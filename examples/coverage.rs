@@ -2,18 +2,20 @@
 //! known, a fit each.
 //!
 //! `cargo xtask coverage [--machines N] [--seed N] [--threads N] [--cell WORDS]...` prints a table; with `--causes` for
-//! machines that differ from a rigid axis with viscous and Coulomb friction, integrated without taut's solvers, and
-//! with `--told` the findings of each.
+//! machines that differ from a rigid axis with viscous and Coulomb friction, integrated without taut's solvers, and for
+//! gantries that lack one element, and with `--told` the findings of each.
 
 // Each of them is used in part.
 #[allow(dead_code)]
 #[path = "../tests/common"]
 mod common {
     pub mod chance;
+    pub mod gantries;
     pub mod logged;
     pub mod truths;
 }
 
+use common::gantries::{self, Lacks};
 use common::truths::{Truth, drawn};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
@@ -574,6 +576,76 @@ fn causes(machines: u64, seed: u64, threads: u64, (only, is_told): (&[String], b
     }
 }
 
+/// Findings of the fits of gantries that lack one element.
+#[derive(Default)]
+struct OfGantries {
+    machines: usize,
+    /// The cause is the right one, with the part that has it; the right one with another part; another one.
+    right: usize,
+    elsewhere: usize,
+    wrong: usize,
+    /// The right cause is another one that the logs hardly tell from the named one.
+    alike: usize,
+    warned: usize,
+    /// Intervals that hold, of how many.
+    held: [usize; 2],
+    /// Those that hold, or of whose fit a warning names the right cause.
+    safe: usize,
+}
+
+fn of_gantry(lacks: Lacks, seed: u64, is_told: bool, sum: &Mutex<OfGantries>) {
+    let gantries::Drawn { case, plan, values, part, size } = gantries::drawn(seed, lacks);
+    let fitted = fit(&case, &plan, None, &mut |_| Flow::Continue);
+    let mut sum = sum.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    sum.machines += 1;
+    let Ok(fitted) = fitted else { return };
+    let inside = |(name, value): &(String, f64)| {
+        let own = fitted.estimates.iter().find(|one| one.name == *name);
+        own.and_then(|one| one.interval).is_some_and(|[low, high]| low <= *value && *value <= high)
+    };
+    let held = values.iter().filter(|own| inside(own)).count();
+    sum.held[0] += held;
+    sum.held[1] += values.len();
+    let cause = fitted.cause.as_ref();
+    let is_right = cause.is_some_and(|cause| cause.key == lacks.key());
+    let first = cause.map_or("", |cause| cause.words.split(", or ").next().unwrap_or_default());
+    let is_of_part = first.contains(&part);
+    sum.right += usize::from(is_right && is_of_part);
+    sum.elsewhere += usize::from(is_right && !is_of_part);
+    sum.wrong += usize::from(cause.is_some() && !is_right);
+    sum.alike += usize::from(cause.is_some_and(|cause| !is_right && cause.words.contains("hardly tell apart")));
+    sum.warned += usize::from(fitted.findings.iter().any(|one| one.grade == Grade::Warning));
+    let is_named = is_right && fitted.findings.iter().any(|one| one.code == lacks.key() && one.grade == Grade::Warning);
+    sum.safe += if is_named { values.len() } else { held };
+    if is_told {
+        let kind = case.machine.kind.word();
+        let lines: Vec<String> = fitted.findings.iter().map(|one| format!("\n  {}: {one}", one.code)).collect();
+        eprintln!("{seed} {kind}, {part} {size:.4e}: {held} of {} hold{}", values.len(), lines.concat());
+    }
+}
+
+/// The table of causes of gantries.
+fn causes_of_gantries(machines: u64, seed: u64, threads: u64, (only, is_told): (&[String], bool)) {
+    println!(
+        "| what the model lacks | machines | named | of another part | another cause | alike | a warning | intervals that hold | that hold, or a warning names it |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for lacks in Lacks::ALL {
+        if !only.is_empty() && !only.iter().any(|words| lacks.name().contains(words.as_str())) {
+            continue;
+        }
+        let sum = Mutex::new(OfGantries::default());
+        for_each(machines, threads, |k| of_gantry(lacks, seed.wrapping_mul(1_000_003) + k, is_told, &sum));
+        let sum = sum.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let OfGantries { machines, right, elsewhere, wrong, alike, warned, held: [held, all], safe } = sum;
+        println!(
+            "| {} | {machines} | {right} | {elsewhere} | {wrong} | {alike} | {warned} | {held} of {all} | {:.0} % |",
+            lacks.name(),
+            100.0 * safe as f64 / all.max(1) as f64
+        );
+    }
+}
+
 fn main() -> ExitCode {
     let (mut machines, mut seed, mut threads, mut only) = (2000, 1, 2, Vec::new());
     let (mut of_causes, mut is_told) = (false, false);
@@ -604,6 +676,7 @@ fn main() -> ExitCode {
     }
     if of_causes {
         causes(machines, seed, threads, (&only, is_told));
+        causes_of_gantries(machines, seed, threads, (&only, is_told));
         return ExitCode::SUCCESS;
     }
     println!("| disturbance; log | viscous | Coulomb | mass | force | half-width | without an interval |");

@@ -2,10 +2,12 @@
 //! often as they say.
 
 use crate::common::chance::Chance;
+use crate::common::gantries::{COUNT, Drawn, Lacks, drawn as lacking, stage};
 use std::sync::Arc;
 use taut::case::{Case, Plan};
 use taut::fit::compare::{ComparisonOptions, FrictionLaw, compare};
-use taut::fit::{Fit, check, drift, fit};
+use taut::fit::least_squares::{Differences, Residuals};
+use taut::fit::{Fit, Problem, check, drift, fit};
 use taut::log::{Log, Output, Quantity};
 use taut::machine::{Machine, MachineKind};
 use taut::signal::Hold;
@@ -19,18 +21,10 @@ fn inputs(kind: MachineKind) -> String {
     format!("experiment.0.input={{ {} }}", all.join(", "))
 }
 
-/// The encoder of all motors: 10 000 counts a turn.
-const COUNT: f64 = std::f64::consts::TAU / 10_000.0;
-
 /// A stage of this kind with one experiment on both motors.
 fn case(kind: MachineKind, changes: &[&str]) -> Case {
-    let file = match kind {
-        MachineKind::HFrame => "stages/h-frame/h-frame.toml",
-        MachineKind::DualBelt => "stages/dual-belt/dual-belt.toml",
-        MachineKind::Axis | MachineKind::CoreXy => "stages/core-xy/core-xy.toml",
-    };
     let rows = [&*inputs(kind), "experiment.0.until=0.5", "experiment.0.every=1ms"];
-    let mut case = Case::read_with(file, &[&rows, changes].concat()).unwrap();
+    let mut case = Case::read_with(stage(kind), &[&rows, changes].concat()).unwrap();
     case.experiments.truncate(1);
     case
 }
@@ -348,6 +342,58 @@ fn a_delay_of_the_inputs_of_a_gantry_is_named() {
     }
 }
 
+/// What was tried on an axis alone is tried on the drives, sensors and slides of a gantry, and named with its size.
+#[test]
+fn a_missing_element_of_a_gantry_is_named() {
+    for lacks in [Lacks::DriveDelay, Lacks::Limit, Lacks::Stribeck, Lacks::Breakaway, Lacks::Load] {
+        let Drawn { case, plan, part, size, .. } = lacking(1_000_003, lacks);
+        let found = fitted(&case, &plan);
+        let cause = found.cause.as_ref().unwrap_or_else(|| panic!("{lacks:?}: {:#?}", found.findings));
+        assert!(cause.key == lacks.key() && cause.words.contains(&part), "{lacks:?} of {part}: {}", cause.words);
+        let own = &cause.parameters[0];
+        assert!((own.value / size - 1.0).abs() < 0.2, "{lacks:?} of {size}: {own:?}");
+        assert!(found.findings.iter().any(|one| one.code == lacks.key()), "{lacks:?}: {:#?}", found.findings);
+    }
+}
+
+/// `nuisance` takes the delay of one drive, with exact derivatives.
+#[test]
+fn the_delay_of_one_drive_is_fitted() {
+    for seed in 0..3 {
+        let Drawn { case, mut plan, part, size, .. } = lacking(seed, Lacks::DriveDelay);
+        let drives = case.machine.geometry().drives;
+        let drive = drives.iter().position(|at| at.label.name == part).unwrap();
+        plan.nuisance.drive_delay = Some(drive);
+        let mut problem = Problem::new(&case, &plan).unwrap();
+        let (mut x, bounds, delay) = (problem.start(), problem.bounds(), problem.parameters.len());
+        // Between samples.
+        x[delay] = 0.4;
+        let mut at = |x: &[f64]| {
+            let mut residuals = vec![0.0; problem.rows()];
+            assert!(problem.evaluate(x, &mut residuals));
+            residuals
+        };
+        let here = at(&x);
+        let moved = [1e-4, -1e-4].map(|by| {
+            let mut x = x.clone();
+            x[delay] += by;
+            at(&x)
+        });
+        let jacobian = problem.jacobian(&x, &here, &bounds, &Differences::Central).unwrap();
+        assert_eq!(problem.differences, 0);
+        let (exact, n) = (jacobian.column(delay), here.len());
+        let slopes: Vec<f64> = (0..n).map(|k| (moved[0][k] - moved[1][k]) / 2e-4).collect();
+        let most = slopes.iter().fold(0.0f64, |most, slope| most.max(slope.abs()));
+        let off = (0..n).fold(0.0f64, |most, k| most.max((exact[k] - slopes[k]).abs()));
+        assert!(most > 0.0 && off < 1e-4 * most, "{part}: {off:e} of {most:e}");
+        let found = fitted(&case, &plan);
+        let name = format!("{}_delay", drives[drive].input);
+        let own = found.estimates.iter().find(|one| one.name == name).unwrap();
+        assert!((own.value - size).abs() < 4.0 * own.error.unwrap() && own.unit == "s", "{own:?} for {size}");
+        assert!(found.cause.is_none(), "{:#?}", found.findings);
+    }
+}
+
 /// Racking of a bridge in a log whose model has none.
 #[test]
 fn a_bridge_that_yaws_is_named() {
@@ -433,6 +479,49 @@ fn a_dual_belt_is_fitted_with_the_logs_of_three_motors() {
     assert_eq!(found.estimates.len(), 7);
 }
 
+/// Every quantity that a log of a dual belt can have, alone with the encoders and all together: a scale at bridge or cart,
+/// a camera, an accelerometer at the cart, tachometers, currents and voltages.
+#[test]
+fn a_dual_belt_is_fitted_with_every_sensor() {
+    let truth = case(MachineKind::DualBelt, &[SHORT, "bridge.mass=1", "cart.mass=0.4"]);
+    let run = simulate(&truth.machine, &truth.experiments[0], Solver::Exact).unwrap().trajectory;
+    let time = run.get("time").unwrap();
+    let mut chance = Chance::new(17);
+    let mut measured = |quantity: &Quantity| {
+        let name = quantity.name();
+        let values: Vec<f64> = match quantity.is_acceleration() {
+            false => run.get(name).unwrap().to_vec(),
+            true => {
+                let speed = run.get(&name.replace("acceleration", "speed")).unwrap();
+                let slope = |k: usize| {
+                    let (before, after) = (k.saturating_sub(1), (k + 1).min(speed.len() - 1));
+                    (speed[after] - speed[before]) / (time[after] - time[before])
+                };
+                (0..speed.len()).map(slope).collect()
+            }
+        };
+        let most = values.iter().fold(0.0f64, |most, value| most.max(value.abs()));
+        let values = values.iter().map(|value| value + 1e-3 * most * chance.normal()).collect();
+        Output { quantity: *quantity, absolute: false, values }
+    };
+    let all: Vec<Output> = Quantity::for_kind(MachineKind::DualBelt).iter().map(&mut measured).collect();
+    let own = with_log(case(MachineKind::DualBelt, &[SHORT]), &truth, None, 1);
+    let plan = Plan { free: ["bridge.mass", "cart.mass"].map(String::from).to_vec(), ..Plan::default() };
+    let encoders = own.experiments[0].log.as_ref().unwrap().outputs.clone();
+    let is_new = |output: &&Output| encoders.iter().all(|encoder| encoder.quantity != output.quantity);
+    let each = all.iter().filter(is_new).map(|output| [&encoders[..], std::slice::from_ref(output)].concat());
+    let positions = all.iter().filter(|own| own.quantity.is_linear() && own.quantity.is_position()).cloned().collect();
+    for outputs in each.chain([positions, all.clone()]) {
+        let mut own = own.clone();
+        let names: Vec<&str> = outputs.iter().map(|output| output.quantity.name()).collect();
+        Arc::make_mut(own.experiments[0].log.as_mut().unwrap()).outputs.clone_from(&outputs);
+        let found = fitted(&own, &plan);
+        for (estimate, value) in found.estimates.iter().zip([1.0, 0.4]) {
+            assert!((estimate.value / value - 1.0).abs() < 5e-3, "{names:?}: {estimate:?}");
+        }
+    }
+}
+
 /// Out and back of a CoreXY's belt are stretched alike: only the sum of their stiffnesses shows.
 #[test]
 fn spans_of_one_belt_show_by_their_sum() {
@@ -466,8 +555,7 @@ fn belts_are_found_from_a_stiffness_that_is_far_off() {
     }
 }
 
-/// A bridge that rubs more on its way back, fitted with friction that is the same both ways: it is said that the model
-/// lacks what is not among the elements that are tried.
+/// A bridge that rubs more on its way back, fitted with friction that is the same both ways: the model lacks something.
 #[test]
 fn what_a_gantry_lacks_is_a_warning() {
     for kind in [MachineKind::CoreXy, MachineKind::HFrame, MachineKind::DualBelt] {
@@ -476,7 +564,9 @@ fn what_a_gantry_lacks_is_a_warning() {
         let plan = Plan { free: vec!["bridge.friction.coulomb".into(), "bridge.mass".into()], ..Plan::default() };
         let found = fitted(&own, &plan);
         let warned: Vec<&str> = found.warnings().map(|one| one.code).collect();
-        assert!(warned.contains(&"noise"), "{kind:?}: {:#?}", found.findings);
+        let is_told =
+            found.cause.as_ref().is_some_and(|cause| warned.contains(&cause.key)) || warned.contains(&"noise");
+        assert!(is_told, "{kind:?}: {:#?}", found.findings);
     }
 }
 

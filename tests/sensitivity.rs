@@ -117,7 +117,7 @@ impl Change {
 
     fn variable(&self, setup: &Setup) -> Variable {
         match self {
-            Change::Delay => Variable::Delay(1.0),
+            Change::Delay => Variable::Delay { drive: None, unit: 1.0 },
             Change::Offset => Variable::Offset { drive: 0, unit: 1.0, from: setup.times[0] + setup.delay },
             Change::Number(_) | Change::Speed | Change::Position => {
                 Variable::central(3e-5 * self.size(), |by| self.moved(setup, by).begun())

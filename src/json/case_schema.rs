@@ -8,6 +8,7 @@ use crate::log::PRESETS;
 use crate::machine::{BELTS, MachineKind, Quantity};
 use crate::parameter::{self, Fallback, Parameter};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeSet;
 
 /// The schema, as JSON Schema draft 2020-12. Its `$id` is `urn:taut:case:1`: editors refuse one that is no whole URI.
 pub fn case_schema() -> Value {
@@ -159,9 +160,10 @@ fn pulley(section: &str) -> Value {
     table(section, &[("inertia", inertia), ("friction", reference("pulley_friction"))])
 }
 
-/// Bridge or cart of a gantry.
+/// The bridge of a gantry.
 fn slide(section: &str) -> Value {
-    table(section, &[("friction", reference("friction"))])
+    let line = described(list(list(plain())), "Points [speed, force]");
+    table(section, &[("friction", reference("friction")), ("force_by_speed", line)])
 }
 
 /// Of an axis and of a gantry, whose cart has a travel of its own.
@@ -247,15 +249,19 @@ fn input() -> Value {
     ])
 }
 
+/// Sides of the drives of gantries, each once.
+fn sides() -> BTreeSet<&'static str> {
+    let gantries = MachineKind::ALL.into_iter().filter(|kind| *kind != MachineKind::Axis);
+    gantries.flat_map(|kind| kind.geometry().sides()).collect()
+}
+
 fn experiment() -> Value {
     let initial = {
         let mut both = keys("experiment.initial", &[]);
         both.extend(keys("gantry.initial", &[]));
         object(&both)
     };
-    let sides =
-        MachineKind::ALL.into_iter().filter(|kind| *kind != MachineKind::Axis).flat_map(|kind| kind.geometry().sides());
-    let sides = sides.map(|side| (side.to_string(), reference("input"))).collect();
+    let sides = sides().into_iter().map(|side| (side.to_string(), reference("input"))).collect();
     table(
         "experiment",
         &[
@@ -341,6 +347,7 @@ fn fit() -> Value {
     let flag = || json!({ "type": "boolean" });
     let nuisance = [
         ("delay", scope()),
+        ("drive_delay", words(sides())),
         ("input_gain", scope()),
         ("input_offset", scope()),
         ("initial_state", flag()),

@@ -4,6 +4,7 @@
 pub mod chance;
 pub mod data;
 pub mod document;
+pub mod gantries;
 pub mod ignored;
 pub mod logged;
 pub mod loops;

@@ -218,7 +218,7 @@ pub fn drawn(seed: u64, truth: Truth) -> (Case, Values) {
 }
 
 /// Positions as a sensor reads them behind play of this width, of which this share lies ahead at first.
-fn behind_play(positions: &mut [f64], width: f64, ahead: f64) {
+pub fn behind_play(positions: &mut [f64], width: f64, ahead: f64) {
     let mut read = positions[0];
     for position in positions {
         read = read.clamp(*position - ahead * width, *position + (1.0 - ahead) * width);

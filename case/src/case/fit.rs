@@ -149,6 +149,8 @@ impl Prior {
 pub struct Nuisances {
     /// The input acts later than logged.
     pub delay: Scope,
+    /// The drive of a gantry whose input alone acts later than logged, in all logs.
+    pub drive_delay: Option<usize>,
     /// A factor on the input.
     pub input_gain: Scope,
     /// Something added to the input.
@@ -534,7 +536,10 @@ pub(super) fn prior_of(kind: &str, field: &Field, key: &str) -> Result<Prior> {
 fn nuisances(table: &Table, machine: &Machine, experiments: &[Experiment], whole: bool) -> Result<Nuisances> {
     let Some(field) = table.optional("nuisance") else { return Ok(Nuisances::default()) };
     let table = field.table()?;
-    table.check_keys(&["delay", "input_gain", "input_offset", "initial_state", "bias", "sensor_play"], &[])?;
+    table.check_keys(
+        &["delay", "drive_delay", "input_gain", "input_offset", "initial_state", "bias", "sensor_play"],
+        &[],
+    )?;
     let flag = |key: &str| match table.optional(key) {
         None => Ok(false),
         Some(field) => match &field.node.kind {
@@ -556,6 +561,7 @@ fn nuisances(table: &Table, machine: &Machine, experiments: &[Experiment], whole
     let logs = whole.then_some(experiments);
     Ok(Nuisances {
         delay: scope("delay")?,
+        drive_delay: table.optional("drive_delay").map_or(Ok(None), |field| drive(&field, machine).map(Some))?,
         input_gain: scope("input_gain")?,
         input_offset: scope("input_offset")?,
         initial_state: flag("initial_state")?,
@@ -563,6 +569,16 @@ fn nuisances(table: &Table, machine: &Machine, experiments: &[Experiment], whole
         sensor_play: table.optional("sensor_play").map_or(Ok(None), |field| logged_position(&field, machine, logs))?,
         sensor_scale: None,
     })
+}
+
+/// The drive of a gantry that a field names by its side.
+fn drive(field: &Field, machine: &Machine) -> Result<usize> {
+    if machine.has_one_coordinate() {
+        return Err(field
+            .fail("this names one of several drives, and an axis has one")
+            .next("write delay = \"shared\", or delay = true for a delay of each log"));
+    }
+    field.choice(&machine.geometry().sides().zip(0..).collect::<Vec<_>>())
 }
 
 /// The position of a machine that a field names; one that a log has, if the logs of these experiments were read.

@@ -1,13 +1,13 @@
 //! The case file of a gantry: its drives, a bridge, a cart on it.
 
-use super::friction::friction;
+use super::friction::{friction, line};
 use super::reader::{Field, Table};
 use super::{input, machine, sheet, stepper};
 use crate::error::{Error, Result};
 use crate::friction::Friction;
 use crate::machine::{
-    Belt, BeltMake, BeltSheet, DriveAt, DriveUnit, Encoder, EncoderPlace, Machine, MachineKind, Pulley, Slide, Spans,
-    Yaw,
+    Belt, BeltMake, BeltSheet, DriveAt, DriveUnit, Encoder, EncoderPlace, Machine, MachineKind, Pulley, Slide,
+    SlideForces, Spans, Yaw,
 };
 use crate::mechanism::{STEPPERS, State};
 use crate::signal::Signal;
@@ -170,7 +170,10 @@ fn slide(root: &Table, name: &str) -> Result<Slide> {
     // A key of the bridge's table alone.
     table.check_keys(&[], if name == "cart" { &["yaw"] } else { &[] })?;
     let travel = table.optional("travel").map(|field| machine::travel(&field.table()?)).transpose()?;
-    Ok(Slide { travel, ..Slide::new(table.number("mass")?, friction(&table)?) })
+    let by_speed = table.optional("force_by_speed").map(|field| line(&field, ["speed", "force"])).transpose()?;
+    let forces = SlideForces { along: None, by_speed };
+    let load = table.number("load")?;
+    Ok(Slide { travel, forces, load, ..Slide::new(table.number("mass")?, friction(&table)?) })
 }
 
 /// Yaw of the bridge, if the file describes it.

@@ -466,7 +466,7 @@ impl Machine {
                 let what = format!("the travel of the {name} ends before it begins");
                 return Err(Error::new(what).allowed("max above min"));
             }
-            if slide.along.is_some() || slide.forces != super::SlideForces::default() {
+            if slide.along.is_some() || slide.forces.along.is_some() {
                 return Err(Error::new(format!(
                     "friction and forces of the {name} cannot change along its travel yet"
                 )));

@@ -1,7 +1,7 @@
 //! Location of a parameter in a machine, with access to it.
 
 use crate::friction::{Friction, Law, Shape, decay_of_velocity, velocity_of_decay};
-use crate::machine::{Amplifier, AmplifierMode, Belt, BeltModel, Machine, MachineKind, Motor, SimpleDrive};
+use crate::machine::{Amplifier, AmplifierMode, Belt, BeltModel, Machine, MachineKind, Motor, SimpleDrive, Slide};
 
 /// Location of a parameter in a machine.
 #[derive(Debug, Clone, Copy)]
@@ -44,6 +44,8 @@ pub(super) enum Of {
     Span,
     /// Each point of a line of an axis; the function gives their number.
     Point(fn(&Machine) -> usize),
+    /// Each point of a line of each slide of a machine with several; the function gives their number on a slide.
+    SlidePoint(fn(&Slide) -> usize),
 }
 
 impl Accessor {
@@ -59,6 +61,10 @@ impl Accessor {
             Of::Slide => (slides > 1).then_some((List::Slides, slides)),
             Of::Span => Some((List::Numbers, machine.belt.stiffness.len())),
             Of::Point(count) => (slides == 1).then(|| (List::Points, count(machine))),
+            Of::SlidePoint(count) => (slides > 1).then(|| {
+                let counts: Vec<usize> = machine.slides().map(count).collect();
+                (List::SlidePoints(counts[0]), counts.iter().sum())
+            }),
         }
     }
 }
@@ -77,6 +83,9 @@ pub enum List {
     Drives(MachineKind),
     /// `bridge.mass`, `cart.mass`: one for each slide, with the bridge's key in the table.
     Slides,
+    /// `bridge.force_by_speed.0.force`, `cart.force_by_speed.0.force`: a list of points for each slide, this number of
+    /// them on the bridge.
+    SlidePoints(usize),
 }
 
 /// Sliding bodies of a gantry, as prefixes of keys.
@@ -99,12 +108,16 @@ impl List {
                 (Some(slide), Some(rest)) => format!("{slide}{rest}"),
                 _ => key.to_string(),
             },
+            List::SlidePoints(of_bridge) => {
+                let (slide, point) = if index < of_bridge { (0, index) } else { (1, index - of_bridge) };
+                List::Points.key(&List::Slides.key(key, slide), point)
+            }
         }
     }
 
     /// True if the parameter's own key sets all elements together.
     pub(super) fn has_whole(self) -> bool {
-        self != List::Slides
+        !matches!(self, List::Slides | List::SlidePoints(_))
     }
 }
 
@@ -451,8 +464,27 @@ pub(super) fn set_stribeck_decay(friction: &mut Friction, decay: f64) {
     set_stribeck_velocity(friction, velocity_of_decay(decay));
 }
 
-/// A number of each point of a line of the cart: 0 for the argument, 1 for the value.
+/// A number of each point of a line of the cart, or of each slide: 0 for the argument, 1 for the value.
 macro_rules! points {
+    (slide $part:literal, |$slide:ident| $($line:tt)*) => {{
+        const COUNT: fn(&Slide) -> usize = |$slide| $($line)*.as_ref().map_or(0, |line| line.points().len());
+        Field::new(
+            Of::SlidePoint(COUNT),
+            |machine, index| {
+                let (slide, point) = slide_point(machine, COUNT, index)?;
+                let $slide = machine.slide(slide)?;
+                $($line)*.as_ref()?.points().get(point).map(|point| point[$part])
+            },
+            |machine, index, value| {
+                let Some((slide, point)) = slide_point(machine, COUNT, index) else { return };
+                if let Some($slide) = machine.slide_mut(slide)
+                    && let Some(line) = &mut $($line)*
+                {
+                    line.set(point, $part, value);
+                }
+            },
+        )
+    }};
     ($part:literal, |$machine:ident| $($line:tt)*) => {
         Field::new(
             Of::Point(|$machine| $($line)*.as_ref().map_or(0, |line| line.points().len())),
@@ -464,5 +496,14 @@ macro_rules! points {
             },
         )
     };
+}
+/// A slide of a machine with several, and the index of one of its points, by the index of the point among those of all.
+pub(super) fn slide_point(machine: &Machine, count: fn(&Slide) -> usize, index: usize) -> Option<(usize, usize)> {
+    let mut first = 0;
+    machine.slides().map(count).enumerate().find_map(|(slide, points)| {
+        let own = index.checked_sub(first).filter(|own| *own < points);
+        first += points;
+        own.map(|own| (slide, own))
+    })
 }
 pub(super) use points;

@@ -378,8 +378,10 @@ fn numbers(machine: &Machine, key: &str, free: &[&str]) -> Result<(Vec<Number>, 
         // A single number has no elements, or a list not as many.
         return Err(match list {
             List::None | List::Drives(_) | List::Slides => unknown(machine, key),
-            List::Numbers | List::Points => Error::new(format!("`{key}` does not exist: there are {count}"))
-                .allowed(format!("{} to {}", list.key(row.key, 0), list.key(row.key, count - 1))),
+            List::Numbers | List::Points | List::SlidePoints(_) => Error::new(format!(
+                "`{key}` does not exist: there are {count}"
+            ))
+            .allowed(format!("{} to {}", list.key(row.key, 0), list.key(row.key, count - 1))),
         });
     }
     if whole && matches!(list, List::Drives(_)) {
@@ -505,7 +507,7 @@ fn not_there(machine: &Machine, key: &str, row: &Parameter) -> Error {
         _ if row.key.starts_with("cart.force_along.") => {
             "give force_along to start from, such as force_along = [[\"0 m\", \"0 N\"], [\"0.1 m\", \"1 N\"]]".into()
         }
-        _ if row.key.starts_with("cart.force_by_speed.") => {
+        _ if row.key.ends_with("force_by_speed.force") || row.key.ends_with("force_by_speed.speed") => {
             "give force_by_speed to start from, such as force_by_speed = [[\"0 m/s\", \"0 N\"], [\"0.1 m/s\", \"1 N\"]]"
                 .into()
         }

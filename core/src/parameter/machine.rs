@@ -79,7 +79,8 @@ impl Machine {
         let list = self.sits(row).listed().map(|(list, _)| list);
         // A drive contains only keys of its own parts, a cart only those of every slide.
         let belongs = of_drive.is_none() || matches!(list, Some(List::Drives(_)));
-        (belongs && (of_cart.is_none() || list == Some(List::Slides))).then_some(row)
+        let is_of_slide = matches!(list, Some(List::Slides | List::SlidePoints(_)));
+        (belongs && (of_cart.is_none() || is_of_slide)).then_some(row)
     }
 
     /// The friction of each of its bodies.

@@ -46,6 +46,7 @@ pub fn free_markdown() -> String {
             Of::Gantry => ("gantry", List::None),
             Of::Point(_) => ("axis", List::Points),
             Of::Slide => ("gantry", List::Slides),
+            Of::SlidePoint(_) => ("gantry", List::SlidePoints(1)),
         };
         let all = match row.off {
             Off::No => "–",
@@ -80,6 +81,7 @@ fn keys(row: &Parameter, list: List) -> String {
         List::None | List::Drives(_) => format!("`{}`", row.key),
         List::Numbers => format!("`{}`, `{}` to `.2`", row.key, element(0)),
         List::Points => format!("`{}`, `{}` and so on", row.key, element(0)),
+        List::SlidePoints(of_bridge) => format!("`{}`, `{}` and so on", element(0), element(of_bridge)),
         List::Slides => format!("`{}`, `{}`", element(0), element(1)),
     }
 }

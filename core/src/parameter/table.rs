@@ -3,12 +3,13 @@
 use super::field::{
     Of, always, amplifier, breakaway, is_amplifier, is_brushed, make, motor, of_drive, of_friction, of_law, of_simple,
     of_slide, part, points, set_coulomb, set_radius, set_rated_current, set_simple, set_stribeck_decay,
-    set_stribeck_force, set_stribeck_velocity, simple, stepper, stiffness, stribeck_decay, stribeck_force,
+    set_stribeck_force, set_stribeck_velocity, simple, slide_point, stepper, stiffness, stribeck_decay, stribeck_force,
     stribeck_velocity,
 };
 use super::{Arm, Fallback, Field, INPUT, InStructure, Off, Parameter, Range, Sum, Tuned};
 use crate::design::Structure;
 use crate::friction::Law;
+use crate::machine::Slide;
 
 const fn row(
     key: &'static str,
@@ -618,6 +619,12 @@ const INITIAL: &[Parameter] = &[
 const BRIDGE: &[Parameter] = &[
     row("bridge.mass", "m", "kg", Required, POSITIVE, "0.838 kg", "Mass of the bridge without the cart; of the cart with its load.")
         .at(of_slide!(|s| Some(s.mass), |s, value| s.mass = value)).off("mass"),
+    row("bridge.load", "F_L", "N", Value(0.0), ANY, "-3 N", "Constant force on it, positive towards larger x, or y of the cart.")
+        .at(of_slide!(|s| Some(s.load), |s, value| s.load = value)).off("load"),
+    row("bridge.force_by_speed.speed", "v", "m/s", Required, ANY, "0.1 m/s", "First number of each point of `force_by_speed`: its speed, increasing.")
+        .at(points!(slide 0, |s| s.forces.by_speed)),
+    row("bridge.force_by_speed.force", "F_v", "N", Required, ANY, "-1.5 N", "Second number: force on it at that speed, positive towards larger x or y; linear between points.")
+        .at(points!(slide 1, |s| s.forces.by_speed)),
     row("bridge.travel.min", "", "m", Required, ANY, "-0.2 m", "Least position.")
         .at(of_slide!(travel min)),
     row("bridge.travel.max", "", "m", Required, ANY, "0.2 m", "Greatest position; above `min`.")

@@ -25,9 +25,14 @@ pub enum Variable {
         /// w₀, w₁, w₂
         weights: [f64; 3],
     },
-    /// Delay of all changes of all inputs, s per unit of the variable. At a row on such a change, the derivative is
-    /// one-sided, towards later changes.
-    Delay(f64),
+    /// Delay of all changes of the inputs. At a row on such a change, the derivative is one-sided, towards later
+    /// changes.
+    Delay {
+        /// The drive whose input it is; `None` for all inputs.
+        drive: Option<usize>,
+        /// Delay per unit of the variable, s.
+        unit: f64,
+    },
     /// Offset of the input of a drive per unit of the variable, from the time, s, at which the input begins.
     Offset {
         /// The drive.

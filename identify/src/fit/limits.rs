@@ -1096,6 +1096,21 @@ pub(crate) const CAUSES_FITTED: usize = 16;
 /// Unit: starts. Source: chosen: the nearest does not always lead to the least.
 pub(crate) const STARTS_FITTED: usize = 3;
 
+/// Starts of elements of a machine of several coordinates that take steps, in the order of their predicted costs.
+///
+/// Unit: starts. Source: chosen: bounds the time. Test: `a_missing_element_of_a_gantry_is_named`.
+pub(crate) const CAUSES_STEPPED: usize = 10;
+
+/// Most parts of a machine on which one element takes them.
+///
+/// Unit: starts. Source: chosen.
+pub(crate) const STARTS_STEPPED: usize = 3;
+
+/// Predicted cost of an element, relative to that of one that leaves noise, up to which it is fitted, too.
+///
+/// Unit: 1. Source: chosen: a likelihood of six standard errors on some 700 values.
+pub(crate) const CAUSE_RIVAL: f64 = 1.05;
+
 /// Share of the squared residuals that an element must explain.
 ///
 /// Unit: 1. Source: chosen. Test: `the_right_model_lacks_nothing`.
@@ -1199,6 +1214,26 @@ pub(crate) const CAUSE_LIMITS: [f64; 5] = [0.4, 0.52, 0.64, 0.76, 0.88];
 ///
 /// Unit: as there. Source: chosen: an amplifier that gives less is another cause.
 pub(crate) const CAUSE_LEAST_LIMIT: f64 = 0.1;
+
+/// Inputs of a drive that tell a limit from a factor: above this share of the greatest, and below the next.
+///
+/// Unit: the greatest input. Source: chosen. Test: `a_missing_element_of_a_gantry_is_named`.
+pub(crate) const LEVEL_LEAST: f64 = 0.05;
+
+/// The upper end of these.
+///
+/// Unit: as there. Source: chosen.
+pub(crate) const LEVEL_MOST: f64 = 0.9;
+
+/// Breakaway with which a missing one begins.
+///
+/// Unit: Coulomb friction. Source: chosen. Test: `a_missing_element_of_a_gantry_is_named`.
+pub(crate) const BREAKAWAY_FIRST: f64 = 1.3;
+
+/// Lower bound of a breakaway; below Coulomb friction it has no effect.
+///
+/// Unit: Coulomb friction. Source: chosen.
+pub(crate) const LEAST_BREAKAWAY: f64 = 0.5;
 
 /// Electrical time constants that are tried.
 ///

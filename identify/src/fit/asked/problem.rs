@@ -106,6 +106,7 @@ impl<'a> Problem<'a> {
             let part = plan.part(&experiment.name);
             for mut run in FittedLog::all(experiment, log, &setting) {
                 run.part = parts.iter().position(|name| name == part).unwrap_or(0);
+                run.know_drives(&machine);
                 if plan.closed_loop {
                     run.close(case, log);
                 }
@@ -178,15 +179,19 @@ impl<'a> Problem<'a> {
     }
 
     fn add_extras(&mut self, case: &Case, plan: &Plan) {
-        let &Nuisances { delay, input_gain, input_offset, initial_state, bias, sensor_play, sensor_scale } =
-            &plan.nuisance;
+        let &Nuisances { delay, drive_delay, input_gain, input_offset, initial_state, bias, .. } = &plan.nuisance;
+        let &Nuisances { sensor_play, sensor_scale, .. } = &plan.nuisance;
         let interval = self.runs[0].interval();
         // Samples that are taken after their stamps appear as an early input, if the input is logged.
         let mut inputs = self.runs.iter().flat_map(FittedLog::inputs);
         let is_sampled = inputs.all(|input| matches!(input, Signal::Sampled { .. }));
         let (early, high) = (if is_sampled { -50.0 * interval } else { 0.0 }, 50.0 * interval);
-        let late = Extra { what: Nuisance::Delay, start: 0.0, unit: interval, low: early, high, known: None };
-        let mut scopes = vec![(delay, late)];
+        let late = |of| {
+            let what = Nuisance::Delay(of);
+            Extra { what, start: 0.0, unit: interval, low: early, high, known: None }
+        };
+        let mut scopes = vec![(delay, late(None))];
+        scopes.extend(drive_delay.map(|drive| (Scope::Shared, late(Some(drive)))));
         for drive in 0..self.machine.drives.len() {
             let logged = self.runs.iter().flat_map(|run| &run.logged[drive]);
             let most = logged.fold(0.0, |most: f64, u| most.max(u.abs()));
@@ -436,7 +441,7 @@ impl<'a> Problem<'a> {
             Some(Scale::Log(_)) => 1.0,
             None => match self.shared[j - self.parameters.len()].what {
                 // Its unit is a sample's interval; few logs determine a delay to that.
-                Nuisance::Delay => KNOWN_DELAY,
+                Nuisance::Delay(_) => KNOWN_DELAY,
                 _ => 1.0,
             },
         }

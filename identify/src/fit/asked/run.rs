@@ -19,8 +19,8 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub enum Nuisance {
-    /// The input acts this much later, s.
-    Delay,
+    /// The input of this drive acts this much later, s; `None` for all inputs.
+    Delay(Option<usize>),
     /// Factor on the input of this drive.
     InputGain(usize),
     /// Added to the input of this drive.
@@ -49,7 +49,8 @@ impl Nuisance {
         };
         let of_drive = |drive: usize, what: &str| format!("{}_{what}", geometry.drives[drive].input);
         match self {
-            Nuisance::Delay => "delay".into(),
+            Nuisance::Delay(None) => "delay".into(),
+            Nuisance::Delay(Some(drive)) => of_drive(drive, "delay"),
             Nuisance::InputGain(drive) => of_drive(drive, "gain"),
             Nuisance::InputOffset(drive) => of_drive(drive, "offset"),
             Nuisance::StartPosition(slide) => of_slide(slide, "start_position"),
@@ -64,7 +65,7 @@ impl Nuisance {
     /// Its unit; empty for a bias, which has that of its output.
     pub fn unit(self, machine: &Machine) -> &'static str {
         match self {
-            Nuisance::Delay => "s",
+            Nuisance::Delay(_) => "s",
             Nuisance::InputOffset(drive) => machine.drives[drive].amplifier.mode.unit(),
             Nuisance::StartPosition(_) => "m",
             Nuisance::StartSpeed(_) => "m/s",
@@ -156,11 +157,22 @@ pub struct FittedLog {
     shared: Vec<Extra>,
     /// The closed loop, where the input is not as logged.
     closed: Option<Arc<Closed>>,
+    /// What [`Self::outrun`] returns for the drives of the case, which most fits do not change.
+    outrun: Option<Arc<Outrun>>,
     inputs: Vec<Signal>,
     initial: State,
     every: f64,
     until: f64,
     even: bool,
+}
+
+/// A command compared with the speeds at which the steppers of a machine have torque.
+#[derive(Debug, Clone)]
+struct Outrun {
+    /// The drives of the machine, and its radius: nothing else counts.
+    drives: Vec<DriveUnit>,
+    radius: f64,
+    beyond: Option<[f64; 2]>,
 }
 
 /// A controller that follows a logged reference again.
@@ -271,6 +283,7 @@ impl FittedLog {
             extras: Vec::new(),
             shared: Vec::new(),
             closed: None,
+            outrun: None,
             inputs,
             initial: experiment.initial,
             every,
@@ -302,6 +315,14 @@ impl FittedLog {
             }
             self.closed =
                 Some(Arc::new(Closed { design: design.clone(), model: case.machine.clone(), profile, added }));
+        }
+    }
+
+    /// Compares the command with the speeds of the steppers of the case's machine, once for all machines with these.
+    pub(crate) fn know_drives(&mut self, machine: &Machine) {
+        if machine.stepper().is_some() {
+            let (drives, radius) = (machine.drives.clone(), machine.pulley_radius);
+            self.outrun = Some(Arc::new(Outrun { drives, radius, beyond: self.outrun(machine) }));
         }
     }
 
@@ -337,7 +358,7 @@ impl FittedLog {
             Nuisance::StartPosition(_) => {
                 self.seen.iter().all(|seen| !seen.absolute) && !is_placed && !self.has_scaled_sensor()
             }
-            Nuisance::Delay
+            Nuisance::Delay(_)
             | Nuisance::InputGain(_)
             | Nuisance::InputOffset(_)
             | Nuisance::StartSpeed(_)
@@ -421,9 +442,15 @@ impl FittedLog {
         Experiment { inputs, initial, until: self.until, every: self.every, ..empty() }
     }
 
+    /// Delay of the input of a drive, s; `None` if none is fitted.
+    pub(crate) fn delay(&self, drive: usize, extras: &[f64]) -> Option<f64> {
+        let delays = [None, Some(drive)].map(|of| self.extra(Nuisance::Delay(of), extras));
+        delays.into_iter().flatten().reduce(|common, own| common + own)
+    }
+
     /// The input of a drive, later and with more added to it by the extras.
     fn fed(&self, drive: usize, extras: &[f64]) -> Signal {
-        let delay = self.extra(Nuisance::Delay, extras).unwrap_or(0.0);
+        let delay = self.delay(drive, extras).unwrap_or(0.0);
         let offset = self.extra(Nuisance::InputOffset(drive), extras).unwrap_or(0.0);
         let mut input = match &self.inputs[drive] {
             Signal::Sampled { times, values, hold } if delay != 0.0 || offset != 0.0 => Signal::Sampled {
@@ -451,6 +478,10 @@ impl FittedLog {
     /// A rotor is out of step there whatever its load, and a simulation resolves each turn of the field: a command in
     /// the wrong unit takes minutes.
     pub(crate) fn outrun(&self, machine: &Machine) -> Option<[f64; 2]> {
+        let is_known = |known: &&Arc<Outrun>| known.radius == machine.pulley_radius && known.drives == machine.drives;
+        if let Some(known) = self.outrun.as_ref().filter(is_known) {
+            return known.beyond;
+        }
         let beyond = |(unit, input): (&DriveUnit, &Signal)| {
             let most = pull_out::fastest(unit)? * machine.pulley_radius / unit.amplifier.gain.abs();
             let (mut path, mut outrun, mut peak) = (0.0, 0.0, 0.0f64);
@@ -742,7 +773,7 @@ mod tests {
             assert!(run.predict(&mut Bench::default(), &case.machine, &values, &outputs, &mut columns));
             columns
         };
-        let late = (Nuisance::Delay, 12e-3);
+        let late = (Nuisance::Delay(None), 12e-3);
         let whole = predicted(&mut FittedLog::all(&experiment, &log, &LogOptions::default())[0], &[late]);
         // Windows of 40 rows: seams in every phase of the pulses, and more delay than some inputs last in a window.
         let setting = LogOptions { window: Some(0.04), ..LogOptions::default() };

@@ -143,7 +143,7 @@ impl Problem<'_> {
             run.begun(&self.simulated(run.part, &moved), &self.extras_from(index, &moved, is_moved))
         };
         match extra.map(|extra| (extra.what, extra.unit)) {
-            Some((Nuisance::Delay, unit)) => Some(Variable::Delay(unit)),
+            Some((Nuisance::Delay(drive), unit)) => Some(Variable::Delay { drive, unit }),
             Some((Nuisance::InputOffset(drive), unit)) => {
                 let from = run.begins(drive, &self.extras_of(index, x))?;
                 Some(Variable::Offset { drive, unit, from })
@@ -243,7 +243,7 @@ impl FittedLog {
 
     /// Time at which an offset of the input of a drive begins, s; `None` if the input has no such time.
     fn begins(&self, drive: usize, extras: &[f64]) -> Option<f64> {
-        let delay = self.extra(Nuisance::Delay, extras);
+        let delay = self.delay(drive, extras);
         match &self.inputs()[drive] {
             Signal::Sampled { times, .. } => Some(times.first()? + delay.unwrap_or(0.0)),
             // It is added from the first instant on, whenever the rest comes.

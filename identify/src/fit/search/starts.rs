@@ -410,20 +410,35 @@ fn in_windows(
     Ok(best.map(|best| best.x))
 }
 
-/// A start for an element that a machine of several coordinates may lack, from the point `start`: by fits in the
-/// shorter of these windows alone, which are ranked afterwards. `None` if they fail.
-pub(crate) fn start_in_windows(case: &Case, plan: &Plan, problem: &mut Problem, start: &[f64]) -> Option<Vec<f64>> {
-    let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
-        let options = Options { rounding: problem.rounding(), ..*options };
-        let bounds = problem.bounds();
-        minimise(problem, x, &bounds, &options, &mut |_, _| Flow::Continue)
-    };
-    let mut guess = start.to_vec();
-    for length in &START_WINDOWS[..START_WINDOWS.len() - 1] {
-        let windowed = windowed(plan, problem, *length);
-        improve(case, &windowed, problem, &mut guess, &mut descend).ok().filter(|is_good| *is_good)?;
-    }
-    Some(guess)
+/// A fit in short windows, each with a start of its own.
+pub(crate) struct InWindows<'a> {
+    /// The plan with its windows.
+    pub plan: Plan,
+    pub problem: Problem<'a>,
+    pub x: Vec<f64>,
+    /// Deviation of each quantity's residuals.
+    pub noise: Vec<(Quantity, f64)>,
+}
+
+/// The end of a rough search in the shorter ones of these windows, in which a wrong model stays in step with the logs.
+/// `None` if it fails.
+pub(crate) fn end_in_windows<'a>(case: &Case, plan: &Plan, problem: &Problem<'a>) -> Option<InWindows<'a>> {
+    let [short, plan, _] = START_WINDOWS.map(|samples| windowed(plan, problem, samples));
+    let (mut guess, globals) = (problem.start(), problem.globals());
+    improve(case, &short, &mut problem.clone(), &mut guess, &mut roughly).ok().filter(|is_good| *is_good)?;
+    let mut problem = Problem::new(case, &plan).ok()?.stopped_by(problem.stop());
+    let mut start = problem.start();
+    start[..globals].copy_from_slice(&guess[..globals]);
+    let found = roughly(&mut problem, &start, &rough());
+    let noise = noise_of(&problem, &found, false);
+    (found.ending != Ending::Failed).then_some(InWindows { plan, problem, x: found.x, noise })
+}
+
+/// A search whose steps nobody watches.
+fn roughly(problem: &mut Problem, x: &[f64], options: &Options) -> Minimum {
+    let options = Options { rounding: problem.rounding(), ..*options };
+    let bounds = problem.bounds();
+    minimise(problem, x, &bounds, &options, &mut |_, _| Flow::Continue)
 }
 
 /// The plan in windows of so many samples, but no more windows than [`MOST_START_WINDOWS`].

@@ -42,7 +42,7 @@ pub struct OtherLaw {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cause {
     /// Its key: `spring`, `play`, `sensor_play`, `sensor_scale`, `drive`, `delay`, `limit`, `inductance`, `drag`,
-    /// `stribeck`, `lugre`, `load`, `apart`, `yaw`.
+    /// `stribeck`, `breakaway`, `lugre`, `load`, `apart`, `yaw`, `drive_delay`.
     pub key: &'static str,
     /// In words, with its size.
     pub words: String,

@@ -1,5 +1,6 @@
 //! Warnings and notes on a fit, before its numbers are used: faults of the logs, and of the search.
 
+use super::doubts::Cause;
 use super::finding::{Finding, Grade};
 use super::found::Fit;
 use super::interruption::interruptions;
@@ -126,7 +127,8 @@ fn of_controller(case: &Case, plan: &Plan) -> Vec<Finding> {
 fn of_noise(found: &Searched, fit: &Fit, is_named: bool) -> Option<Finding> {
     let problem = &found.problem;
     let is_searched = problem.machine.has_torque_balance();
-    let is_explained = fit.cause.as_ref().is_some_and(|cause| cause.explained >= CAUSE_SETTLES);
+    let explains = |cause: &Cause| cause.explained >= CAUSE_SETTLES || cause.times_noise <= MORE_THAN_NOISE;
+    let is_explained = fit.cause.as_ref().is_some_and(explains);
     if problem.parameters.is_empty() || is_searched && is_named || is_explained {
         return None;
     }

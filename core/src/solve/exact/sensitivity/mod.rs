@@ -71,8 +71,10 @@ struct Follower<'t, const N: usize> {
     /// Indices of the variables in `s`, those that change the equations first.
     places: Vec<usize>,
     s: Vec<[f64; N]>,
-    /// Jumps of S by later changes of the input, if one falls on the next row.
-    pending: Option<[f64; N]>,
+    /// The inputs, before the first change at zero.
+    inputs: Pieces,
+    /// Jumps of S by later changes of the input, one for each delay, if the change falls on the next row.
+    pending: Vec<Later<N>>,
     /// Modes of this machine with their derivatives, and the tangents of this run.
     slopes: Vec<Sloped<N>>,
     tangents: Vec<Tangent>,
@@ -106,7 +108,7 @@ impl<'t, const N: usize> Follower<'t, N> {
                     let is_start = points.iter().all(|point| point.mechanism == seen.mechanism);
                     Some(Varied { machines, points, weights: *weights, is_start })
                 }
-                Variable::Delay(_) | Variable::Offset { .. } => None,
+                Variable::Delay { .. } | Variable::Offset { .. } => None,
             });
         }
         let changes = |j: &usize| varied[*j].as_ref().is_some_and(|varied: &Varied| !varied.is_start);
@@ -132,7 +134,8 @@ impl<'t, const N: usize> Follower<'t, N> {
             varied,
             places,
             s,
-            pending: None,
+            inputs: Pieces::held(&[0.0; DRIVES], 0.0, f64::INFINITY),
+            pending: Vec::new(),
             slopes,
             tangents: Vec::new(),
             now,
@@ -165,41 +168,48 @@ impl<'t, const N: usize> Follower<'t, N> {
 
     /// Sets new inputs and settles the mode changes that they cause at once.
     fn seam(&mut self, pieces: &Pieces) -> Option<()> {
-        let is_start = self.row == 0 && self.core.common.offset == 0.0;
-        let is_moved = self.task.variables.iter().any(|variable| matches!(variable, Variable::Delay(_)));
-        let before = match (is_moved, is_start) {
-            (false, _) => [0.0; N],
-            (true, false) => self.core.matrices.rate(&self.core.z),
-            (true, true) => {
-                // With a delay, an input that begins at once is zero at first.
-                let mut idle = self.core.clone();
-                idle.set_input(&Pieces::held(&[0.0; DRIVES], 0.0, f64::INFINITY));
-                idle.resolve();
-                idle.matrices.rate(&idle.z)
-            }
-        };
+        let delays = self.task.variables.iter().zip(&self.places).filter_map(|(variable, &place)| match *variable {
+            Variable::Delay { drive, unit } => Some(Later { place, drive, unit, jump: self.earlier(pieces, drive) }),
+            _ => None,
+        });
+        let mut pending: Vec<Later<N>> = delays.collect();
         self.core.set_input(pieces);
         self.core.resolve();
         self.take_up()?;
         self.is_regular = true;
+        self.inputs = *pieces;
         let begins = self.core.time();
         self.offset(begins);
         rest(&self.core, &mut self.s);
-        if is_moved {
+        if !pending.is_empty() {
             let after = self.core.matrices.rate(&self.core.z);
-            let mut jump: [f64; N] = std::array::from_fn(|k| before[k] - after[k]);
-            let space = &self.core.common.space;
-            for place in (0..space.layout.inputs).flat_map(|drive| (0..=space.highest).map(move |k| (drive, k))) {
-                // Its index, and its values from now on: u(t − d).
-                let at = space.chain(place.0, place.1);
-                jump[at] = f64::NAN;
+            for later in &mut pending {
+                later.jump.iter_mut().zip(after).for_each(|(before, after)| *before -= after);
             }
-            self.pending = Some(jump);
+            self.pending = pending;
             if self.core.common.offset != 0.0 || self.row < self.rows {
                 self.move_seam();
             }
         }
         Some(())
+    }
+
+    /// ż between a change of the inputs and the later change of this drive's, or of all.
+    fn earlier(&self, pieces: &Pieces, drive: Option<usize>) -> [f64; N] {
+        let is_start = self.row == 0 && self.core.common.offset == 0.0;
+        if drive.is_none() && !is_start {
+            return self.core.matrices.rate(&self.core.z);
+        }
+        // With a delay, an input that begins at once is zero at first.
+        let (mut earlier, before) = (*pieces, self.inputs.since(pieces.start));
+        match drive {
+            None => earlier.coefficients = before.coefficients,
+            Some(drive) => earlier.coefficients[drive] = before.coefficients[drive],
+        }
+        let mut core = self.core.clone();
+        core.set_input(&earlier);
+        core.resolve();
+        core.matrices.rate(&core.z)
     }
 
     /// ∂u/∂p of an offset of the input.
@@ -212,21 +222,24 @@ impl<'t, const N: usize> Follower<'t, N> {
         }
     }
 
-    /// Jump of the derivatives by a delay at the present change of the input.
+    /// Jumps of the derivatives by delays at the present change of the input.
     fn move_seam(&mut self) {
-        let Some(jump) = self.pending.take() else { return };
+        if self.pending.is_empty() {
+            return;
+        }
         let (space, z) = (&self.core.common.space, &self.core.z);
-        for (variable, &place) in self.task.variables.iter().zip(&self.places) {
-            let (Variable::Delay(unit), s) = (variable, &mut self.s[place]) else { continue };
-            for (k, s) in s.iter_mut().enumerate().filter(|(k, _)| jump[*k].is_finite()) {
-                *s += unit * jump[k];
+        for Later { place, drive, unit, jump } in self.pending.drain(..) {
+            let s = &mut self.s[place];
+            let mut moved = jump;
+            let is_of_inputs = |input: usize| (0..=space.highest).map(move |k| (input, k));
+            for (input, k) in (0..space.layout.inputs).flat_map(is_of_inputs) {
+                // Their values from now on: u(t − d).
+                let (at, is_later) = (space.chain(input, k), drive.is_none_or(|drive| drive == input));
+                let next = if k < space.highest { z[space.chain(input, k + 1)] } else { 0.0 };
+                s[at] = if is_later { -unit * next } else { 0.0 };
+                moved[at] = 0.0;
             }
-            for drive in 0..space.layout.inputs {
-                for k in 0..=space.highest {
-                    let next = if k < space.highest { z[space.chain(drive, k + 1)] } else { 0.0 };
-                    s[space.chain(drive, k)] = -unit * next;
-                }
-            }
+            s.iter_mut().zip(moved).for_each(|(s, jump)| *s += unit * jump);
         }
         rest(&self.core, &mut self.s);
     }
@@ -381,6 +394,18 @@ impl<'t, const N: usize> Follower<'t, N> {
         }
         self.move_seam();
     }
+}
+
+/// A delay at a change of the inputs.
+struct Later<const N: usize> {
+    /// The number of its variable in S.
+    place: usize,
+    /// The drive whose input is delayed; `None` for all.
+    drive: Option<usize>,
+    /// s per unit of the variable.
+    unit: f64,
+    /// ż before the later change minus ż after it.
+    jump: [f64; N],
 }
 
 /// ∂z/∂p at the start.

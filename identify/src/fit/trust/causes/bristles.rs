@@ -13,11 +13,12 @@ use crate::machine::Machine;
 
 /// Bristles that bend by several lengths.
 pub(super) fn bend(site: &Site) -> Vec<Extended> {
-    let (Some(Rubs { key, arm, friction }), Some(length)) = (site.rubs(), site.position_deviation()) else {
+    let first = site.rubs().into_iter().next();
+    let (Some(Rubs { key, arm, friction, .. }), Some(length)) = (first, site.position_deviation()) else {
         return Vec::new();
     };
     let coulomb = friction.forward.coulomb.min(friction.backward.coulomb);
-    let fastest = site.fastest();
+    let fastest = site.fastest("cart");
     let is_long = site.found.problem.counted() > CAUSE_MOST_CURVED;
     if friction.law != Law::Coulomb || coulomb <= 0.0 || fastest <= 0.0 || is_long {
         return Vec::new();
@@ -55,7 +56,7 @@ pub(super) fn bend(site: &Site) -> Vec<Extended> {
 
 /// Bristles in words.
 pub(super) fn words(site: &Site, _: &Extended, found: &Fitted) -> Said {
-    let (key, arm) = site.rubs().map_or(("cart", 1.0), |body| (body.key, body.arm));
+    let (key, arm) = site.rubs().first().map_or(("cart", 1.0), |body| (body.key, body.arm));
     let friction = *friction_of(&mut found.machine.clone(), key);
     let [stiffness, damping, velocity] = match friction.law {
         Law::LuGre { stiffness, damping, velocity } => [stiffness, damping, velocity],
@@ -82,7 +83,7 @@ pub(super) fn words(site: &Site, _: &Extended, found: &Fitted) -> Said {
 
 /// The machine with Coulomb friction.
 pub(super) fn without(site: &Site, mut machine: Machine) -> Machine {
-    if let Some(Rubs { key, friction, .. }) = site.rubs() {
+    if let Some(Rubs { key, friction, .. }) = site.rubs().into_iter().next() {
         let own = friction_of(&mut machine, key);
         own.law = friction.law;
         for (side, own) in [(friction.forward, &mut own.forward), (friction.backward, &mut own.backward)] {

@@ -12,9 +12,10 @@
 //! parts of the logs predicts the other parts better. With the distance d of the estimates from those with it,
 //! intervals of half-width h become √(h² + 2 (d² + h′²)) ≥ d + h′, h′ that of the fit with the element.
 //!
-//! A machine of several coordinates swings out of step with a log that a wrong model cannot follow, and its fit ends
-//! anywhere. Where it does not end within the noise, elements begin with the values of the case and a search in
-//! windows, as the fit itself did, row by row, until one leaves noise.
+//! On a machine of several coordinates, each drive, sensor or slide may have an element: the linear model predicts the
+//! costs of all, and only those with the least take steps. Such a machine swings out of step with a log that a wrong
+//! model cannot follow, and its fit ends anywhere. Where it does not end within the noise, elements are ranked and begin
+//! in short windows, from a fit with the values of the case, until one leaves noise.
 
 mod amplifier;
 mod apart;
@@ -34,29 +35,31 @@ use super::uncertainty::Judged;
 use crate::case::{Case, Plan};
 use crate::fit::asked::run::FittedLog;
 use crate::fit::limits::{
-    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSES_FITTED, COLOURED, HELD_OUT_SHOWS, NORMAL,
-    SAME_MINIMUM, STARTS_FITTED,
+    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_RIVAL, CAUSES_FITTED, CAUSES_STEPPED, COLOURED,
+    HELD_OUT_SHOWS, NORMAL, SAME_MINIMUM, STARTS_FITTED, STARTS_STEPPED,
 };
 use crate::fit::search::starts::{Effort, Searched, is_noise};
 use crate::machine::Machine;
 use extension::{Extended, Extension, Fitted, On, Said, Site};
 use nalgebra::{DMatrix, DVector};
-use tried::Tried;
+use tried::{Start, Tried};
 
 /// All elements.
 const EXTENSIONS: &[Extension] = &[
     row("spring", On::Axis, gear::springs, gear::spring_words, gear::without),
     row("play", On::Axis, gear::plays, gear::play_words, gear::without),
-    row("sensor_play", On::Axis, sensor::plays, sensor::words, as_it_is),
+    row("sensor_play", On::Any, sensor::plays, sensor::words, as_it_is),
     row("drive", On::Gantry, drive::numbers, drive::words, as_it_is),
     row("sensor_scale", On::Gantry, sensor::scales, sensor::scale_words, as_it_is),
     row("delay", On::Any, stamp::delays, stamp::words, as_it_is),
-    row("limit", On::Axis, amplifier::limits, amplifier::limit_words, amplifier::without_limit),
+    row("drive_delay", On::Gantry, stamp::drive_delays, stamp::drive_words, as_it_is),
+    row("limit", On::Any, amplifier::limits, amplifier::limit_words, amplifier::without_limit),
     row("inductance", On::Any, amplifier::inductances, amplifier::inductance_words, amplifier::without_inductance),
-    row("drag", On::Axis, force::drags, force::drag_words, force::without),
-    row("stribeck", On::Axis, force::falls, force::fall_words, force::without_fall),
+    row("drag", On::Any, force::drags, force::drag_words, force::without),
+    row("stribeck", On::Any, force::falls, force::fall_words, force::without_fall),
+    row("breakaway", On::Gantry, force::breakaways, force::breakaway_words, force::without_breakaway),
     Extension { is_curved: true, ..row("lugre", On::Axis, bristles::bend, bristles::words, bristles::without) },
-    row("load", On::Axis, force::loads, force::load_words, as_it_is),
+    row("load", On::Any, force::loads, force::load_words, as_it_is),
     row("apart", On::Axis, apart::apart, apart::words, as_it_is),
     Extension { is_curved: true, ..row("yaw", On::Gantry, yaw::bearings, yaw::words, yaw::without) },
 ];
@@ -131,19 +134,21 @@ pub(crate) fn cause(case: &Case, plan: &Plan, found: &Searched, law: Option<&Oth
 /// others. `goal` is the cost that they have to fall below.
 fn begun<'a>(site: &Site<'_, 'a>, is_curved: bool, goal: f64) -> Vec<Tried<'a>> {
     let before = site.found.best.cost;
-    let rows = EXTENSIONS.iter().filter(|row| row.is_curved == is_curved && row.on.takes(&site.machine));
-    let of = |row: &'static Extension| {
-        let tries = (row.tries)(site).into_iter();
-        let begun = tries.filter_map(|extended| Tried::begun(site, row, extended, goal));
-        begun.filter(|tried| tried.cost() < CAUSE_NEAR * before).collect::<Vec<_>>()
-    };
     let mut ranked: Vec<Tried> = Vec::new();
-    for row in rows {
-        ranked.extend(of(row));
-        // Searches in windows take long. Numbers of drives and of sensors, which come next, may resemble each other.
-        if site.is_anew && row.key != "drive" && ranked.iter().any(Tried::is_noise) {
+    let mut noise: Option<f64> = None;
+    for start in starts(site, is_curved) {
+        // Elements that the logs hardly tell from one that leaves noise are fitted, too.
+        if noise.is_some_and(|noise| start.promised > CAUSE_RIVAL * noise) {
             break;
         }
+        let promised = start.promised;
+        let Some(tried) = Tried::begun(site, start, goal).filter(|tried| tried.cost() < CAUSE_NEAR * before) else {
+            continue;
+        };
+        if site.is_anew && tried.is_noise() {
+            noise = noise.or(Some(promised));
+        }
+        ranked.push(tried);
     }
     ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
     let most = (1.0 - CAUSE_EXPLAINS) * before;
@@ -163,6 +168,31 @@ fn begun<'a>(site: &Site<'_, 'a>, is_curved: bool, goal: f64) -> Vec<Tried<'a>> 
     starts.sort_by_key(|(count, _)| *count);
     starts.truncate(CAUSES_FITTED);
     starts.into_iter().map(|(_, tried)| tried).collect()
+}
+
+/// Starts of all elements, in the order of the table. Machines of several coordinates have many parts that may have an
+/// element: of these starts, those with the least predicted costs, the least first, one for each part, and not many of
+/// one element.
+fn starts(site: &Site, is_curved: bool) -> Vec<Start> {
+    let is_ranked = !site.machine.has_one_coordinate();
+    let rows = EXTENSIONS.iter().filter(|row| row.is_curved == is_curved && row.on.takes(&site.machine));
+    let tries = rows.flat_map(|row| (row.tries)(site).into_iter().map(move |extended| (row, extended)));
+    let starts = tries.filter_map(|(row, extended)| Start::new(site, row, extended, is_ranked));
+    let mut starts: Vec<Start> = starts.collect();
+    if is_ranked {
+        starts.sort_by(|a, b| a.promised.total_cmp(&b.promised));
+        let mut taken: Vec<Start> = Vec::new();
+        for start in starts {
+            let is_new = taken.iter().all(|other| other.kind() != start.kind());
+            let alike = taken.iter().filter(|other| other.kind().0 == start.kind().0).count();
+            if is_new && alike < STARTS_STEPPED {
+                taken.push(start);
+            }
+        }
+        taken.truncate(CAUSES_STEPPED);
+        starts = taken;
+    }
+    starts
 }
 
 /// True if missing elements are searched for: the residuals are not white, or, of a machine of several coordinates,

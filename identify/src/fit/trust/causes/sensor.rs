@@ -15,10 +15,10 @@ pub(super) fn plays(site: &Site) -> Vec<Extended> {
     let of = |quantity: Quantity| {
         let mut plan = site.plan.clone();
         plan.nuisance.sensor_play = Some(quantity);
-        let deviation = site.deviation(quantity);
+        let deviation = site.deviation_at_start(quantity);
         let with = move |times: &f64| {
             let telling = Telling::Nuisance(Nuisance::SensorPlay(quantity), times * deviation);
-            Extended::new(site.with(site.machine.clone()), plan.clone(), telling)
+            Extended::new(site.with(site.begins().clone()), plan.clone(), telling)
         };
         CAUSE_WIDTHS.iter().map(with).collect::<Vec<_>>()
     };

@@ -10,7 +10,7 @@ use crate::fit::search::regression::suspected_delay;
 
 /// Inputs that act late, or samples that are taken later than their stamps.
 pub(super) fn delays(site: &Site) -> Vec<Extended> {
-    if site.plan.nuisance.delay != Scope::Off {
+    if site.plan.nuisance.delay != Scope::Off || site.plan.nuisance.drive_delay.is_some() {
         return Vec::new();
     }
     let mut plan: Plan = site.plan.clone();
@@ -20,10 +20,27 @@ pub(super) fn delays(site: &Site) -> Vec<Extended> {
     // In windows one start leads to either sign.
     let tried = if site.is_anew { &CAUSE_DELAYS[..1] } else { &CAUSE_DELAYS[..] };
     let starts = tried.iter().map(|share| share * interval).chain(suspected);
-    let of = |delay: f64| {
-        Extended::new(site.with(site.begins().clone()), plan.clone(), Telling::Nuisance(Nuisance::Delay, delay))
+    starts.map(|delay| with(site, &plan, None, delay)).collect()
+}
+
+/// The input of one of several drives that acts late.
+pub(super) fn drive_delays(site: &Site) -> Vec<Extended> {
+    if site.plan.nuisance.delay != Scope::Off || site.plan.nuisance.drive_delay.is_some() {
+        return Vec::new();
+    }
+    let start = CAUSE_DELAYS[0] * site.found.problem.runs[0].interval();
+    let of = |drive: usize| {
+        let mut plan = site.plan.clone();
+        plan.nuisance.drive_delay = Some(drive);
+        with(site, &plan, Some(drive), start)
     };
-    starts.map(of).collect()
+    (0..site.machine.drives.len()).map(of).collect()
+}
+
+/// The case with this delay of one drive, or of all.
+fn with(site: &Site, plan: &Plan, drive: Option<usize>, delay: f64) -> Extended {
+    let telling = Telling::Nuisance(Nuisance::Delay(drive), delay);
+    Extended::new(site.with(site.begins().clone()), plan.clone(), telling)
 }
 
 /// A delay in words; with the width of the interval over which samples scatter, if they do.
@@ -39,6 +56,14 @@ pub(super) fn words(_: &Site, _: &Extended, found: &Fitted) -> Said {
         (false, _) => format!("an input that acts {} late", shown(found.value, "s")),
     };
     Said { words, add: "add nuisance = { delay = \"shared\" } to [fit]".into() }
+}
+
+/// The delay of one drive in words.
+pub(super) fn drive_words(site: &Site, extended: &Extended, found: &Fitted) -> Said {
+    let at = &site.machine.geometry().drives[extended.plan.nuisance.drive_delay.unwrap_or_default()];
+    let when = if found.value < 0.0 { "early" } else { "late" };
+    let words = format!("an input of the {} that acts {} {when}", at.label.name, shown(found.value.abs(), "s"));
+    Said { words, add: format!("add nuisance = {{ drive_delay = \"{}\" }} to [fit]", at.side()) }
 }
 
 /// The standard deviation of the sampling times of positions, s, and its standard error; `None` if the residuals show

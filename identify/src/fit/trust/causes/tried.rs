@@ -8,14 +8,15 @@ use crate::fit::asked::residuals::Residuals;
 use crate::fit::asked::run::{Extra, Nuisance};
 use crate::fit::limits::{
     CAUSE_ALIKE, CAUSE_DIFFERENCE, CAUSE_EXPLAINS, CAUSE_MOST_STEPS, CAUSE_REACH, CAUSE_SLOW, CAUSE_SLOW_STEPS,
-    CAUSE_STEPS, COLOURED, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS,
+    CAUSE_STEPS, COLOURED, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS, TRIAL_ITERATIONS,
 };
 use crate::fit::search::least_squares::{minimise, resume};
 use crate::fit::search::point::{Ending, Minimum, Options};
-use crate::fit::search::starts::{is_noise, start_in_windows, times_noise};
+use crate::fit::search::starts::{is_noise, times_noise};
 use crate::fit::trust::doubts::{Cause, Size};
 use crate::fit::trust::uncertainty::Judged;
 use crate::machine::Machine;
+use crate::parameter;
 use crate::solve::Flow;
 use std::cell::OnceCell;
 
@@ -32,15 +33,86 @@ pub(super) struct Tried<'a> {
     judged: OnceCell<Option<Judged>>,
 }
 
+/// A start of an element, ranked by the cost that the linear model predicts there.
+pub(super) struct Start {
+    row: &'static Extension,
+    extended: Extended,
+    /// The predicted cost; zero if starts are not ranked.
+    pub promised: f64,
+}
+
+impl Start {
+    /// `None` if the model cannot simulate the logs. `is_ranked`: without, the cost is not predicted.
+    pub fn new(site: &Site, row: &'static Extension, extended: Extended, is_ranked: bool) -> Option<Self> {
+        if !is_ranked {
+            return Some(Self { row, extended, promised: 0.0 });
+        }
+        let best = match site.is_anew {
+            true => in_windows(site, &extended)?.1,
+            false => Tried::from(site, row, extended.clone(), (&site.found.problem, &site.found.best.x))?.best,
+        };
+        Some(Self { row, extended, promised: best.cost - best.promise() })
+    }
+
+    /// The row of the table and the part of the machine that has the element.
+    pub fn kind(&self) -> (&'static str, bool, &str) {
+        self.extended.kind(self.row)
+    }
+}
+
+/// The logs in windows with an element, and the linear model at the end of the fit without it.
+fn in_windows<'a>(site: &Site<'_, 'a>, extended: &Extended) -> Option<(Problem<'a>, Minimum)> {
+    let windows = site.windows()?;
+    let plan = Plan { windows: windows.plan.windows, ..extended.plan.clone() };
+    let mut problem = Problem::new(&extended.case, &plan).ok()?.stopped_by(site.found.problem.stop());
+    problem.weigh_by(&windows.noise);
+    let mut start = begin(&problem, &extended.telling, (&windows.problem, &windows.x))?;
+    for (j, own) in problem.parameters.iter().enumerate() {
+        let known = windows.problem.parameters.iter().position(|other| other.name == own.name);
+        start[j] = known.map_or(start[j], |known| problem.variable(j, windows.problem.value(known, windows.x[known])));
+    }
+    let bounds = problem.bounds();
+    let best = Minimum::linearised(&mut problem, &start, &bounds)?;
+    Some((problem, best))
+}
+
+/// The start of a problem with an element: variables of single runs begin at those of another fit to the same logs.
+fn begin(problem: &Problem, telling: &Telling, (other, x): (&Problem, &[f64])) -> Option<Vec<f64>> {
+    let mut start = problem.start();
+    for index in 0..problem.runs.len().min(other.runs.len()) {
+        let known = other.own_variables(index);
+        for (j, extra) in problem.own_variables(index) {
+            let known = known.iter().find(|(_, known)| known.what == extra.what);
+            start[j] = known.map_or(start[j], |(known, _)| x[*known]);
+        }
+    }
+    if let Telling::Nuisance(what, value) = telling {
+        let place = problem.shared.iter().position(|extra| extra.what == *what)?;
+        let Extra { start: zero, unit, .. } = problem.shared[place];
+        start[problem.parameters.len() + place] = (value - zero) / unit;
+    }
+    (start.len() == problem.variables()).then_some(start)
+}
+
 impl<'a> Tried<'a> {
-    /// The result of the first steps from the end of the fit without the element, or from a search in windows that
-    /// begins with the values of the case; `None` if the model cannot simulate the logs. Steps of curved friction,
-    /// which take long, are not taken where the linear model at the start shows that they will not fall below `goal`.
-    pub fn begun(site: &Site<'_, 'a>, row: &'static Extension, extended: Extended, goal: f64) -> Option<Self> {
+    /// The result of the first steps from the end of the fit without the element, or from a search in windows;
+    /// `None` if the model cannot simulate the logs. Steps of curved friction, which take long, are not taken where the
+    /// linear model at the start shows that they will not fall below `goal`.
+    pub fn begun(site: &Site<'_, 'a>, start: Start, goal: f64) -> Option<Self> {
+        let Start { row, extended, .. } = start;
+        let in_windows = match site.is_anew {
+            true => {
+                let (mut problem, begun) = in_windows(site, &extended)?;
+                let found = descend(&mut problem, begun, TRIAL_ITERATIONS, f64::INFINITY)?;
+                Some(found.x[..problem.globals()].to_vec())
+            }
+            false => None,
+        };
         let mut begun = Self::from(site, row, extended, (&site.found.problem, &site.found.best.x))?;
-        if site.is_anew {
-            let Self { extended: Extended { case, plan, .. }, problem, best, .. } = &mut begun;
-            let start = start_in_windows(case, plan, problem, &best.x)?;
+        if let Some(globals) = in_windows {
+            let Self { problem, best, .. } = &mut begun;
+            let mut start = problem.start();
+            start[..globals.len()].copy_from_slice(&globals);
             let bounds = problem.bounds();
             *best = Minimum::linearised(problem, &start, &bounds)?;
         }
@@ -65,20 +137,8 @@ impl<'a> Tried<'a> {
         let noise: Vec<_> = problem.quantities().iter().map(|&own| (own, site.deviation(own))).collect();
         problem.swings = site.found.problem.swings;
         problem.weigh_by(&noise);
-        let mut start = problem.start();
-        for index in 0..problem.runs.len().min(other.runs.len()) {
-            let known = other.own_variables(index);
-            for (j, extra) in problem.own_variables(index) {
-                let known = known.iter().find(|(_, known)| known.what == extra.what);
-                start[j] = known.map_or(start[j], |(known, _)| x[*known]);
-            }
-        }
-        if let Telling::Nuisance(what, value) = extended.telling {
-            let place = problem.shared.iter().position(|extra| extra.what == what)?;
-            let Extra { start: zero, unit, .. } = problem.shared[place];
-            start[problem.parameters.len() + place] = (value - zero) / unit;
-        }
-        if start.len() != problem.variables() || problem.is_stopped() {
+        let start = begin(&problem, &extended.telling, (other, x))?;
+        if problem.is_stopped() {
             return None;
         }
         if row.is_curved {
@@ -144,14 +204,9 @@ impl<'a> Tried<'a> {
         self.best.cost
     }
 
-    /// The row of the table, the side on which the sensor is, and the number, one of several, that differs.
+    /// The row of the table, the side on which the sensor is, and the part of the machine, one of several.
     pub fn kind(&self) -> (&'static str, bool, &str) {
-        let name = match &self.extended.telling {
-            Telling::Differs(name) => name,
-            Telling::Nuisance(Nuisance::SensorScale(quantity), _) => quantity.name(),
-            _ => "",
-        };
-        (self.row.key, self.extended.at_motor, name)
+        self.extended.kind(self.row)
     }
 
     /// True if its residuals are no larger than the noise of the logs.
@@ -159,12 +214,11 @@ impl<'a> Tried<'a> {
         is_noise(&self.problem, &self.best)
     }
 
-    /// True if the logs may hardly tell another number of a drive or sensor from this one, by the least that its fit
-    /// may end with: with n values, of which slow noise leaves n/i², the logarithm of the likelihood is less by n/i²
+    /// True if the logs may hardly tell another element of a machine of several coordinates from this one, by the least
+    /// that its fit may end with: with n values, of which slow noise leaves n/i², the logarithm of the likelihood is less by n/i²
     /// ln(C′/C)/2.
     pub fn may_be_like(&self, judged: &Judged, other: &Self) -> bool {
-        let is_number = |one: &Self| !one.kind().2.is_empty();
-        let is_other = is_number(self) && is_number(other) && self.kind() != other.kind();
+        let is_other = !self.problem.machine.has_one_coordinate() && self.kind() != other.kind();
         let n = self.problem.counted() as f64 / (judged.inflation * judged.inflation).max(1.0);
         is_other && n * (other.least().max(0.0) / self.cost()).ln() < CAUSE_ALIKE * CAUSE_ALIKE
     }
@@ -189,7 +243,7 @@ impl<'a> Tried<'a> {
     /// Index of the variable whose size shows the element.
     fn telling(&self) -> Option<usize> {
         match &self.extended.telling {
-            Telling::Parameter(key) | Telling::Differs(key) => {
+            Telling::Parameter(key) | Telling::Differs(key) | Telling::Above(key, _) => {
                 self.problem.parameters.iter().position(|own| own.name == *key)
             }
             Telling::Nuisance(what, _) => {
@@ -208,10 +262,30 @@ impl<'a> Tried<'a> {
         }
     }
 
+    /// The size of the element, and the number that it is above, SI.
+    fn size(&self) -> [f64; 2] {
+        let value = self.telling().map_or(0.0, |j| self.value(j));
+        match &self.extended.telling {
+            Telling::Above(_, key) => {
+                let least = parameter::value(&self.machine(&self.best.x), key).unwrap_or(0.0);
+                [value - least, least]
+            }
+            _ => [value, 0.0],
+        }
+    }
+
     /// Size of the element in standard errors; for a logarithmic variable, the inverse of its error.
     pub fn standard_errors(&self, judged: &Judged) -> f64 {
         if let Telling::Apart(names) = &self.extended.telling {
             return self.apart(judged, names);
+        }
+        if let Telling::Above(key, other) = &self.extended.telling {
+            let above = |x: &[f64]| {
+                let machine = self.machine(x);
+                Some(parameter::value(&machine, key)? - parameter::value(&machine, other)?)
+            };
+            let error = self.propagated(judged, &above);
+            return if error > 0.0 { self.size()[0] / error } else { 0.0 };
         }
         let Some(j) = self.telling() else { return 0.0 };
         let Some(error) = judged.covariance.error(j).filter(|error| *error > 0.0) else { return 0.0 };
@@ -254,8 +328,8 @@ impl<'a> Tried<'a> {
 
     /// The element in words, without its scatter.
     pub fn words(&self, site: &Site) -> String {
-        let value = self.telling().map_or(0.0, |j| self.value(j));
-        let fitted = Fitted { machine: self.machine(&self.best.x), sizes: &[], value, scatter: None };
+        let [value, least] = self.size();
+        let fitted = Fitted { machine: self.machine(&self.best.x), sizes: &[], value, least, scatter: None };
         (self.row.words)(site, &self.extended, &fitted).words
     }
 
@@ -287,7 +361,7 @@ impl<'a> Tried<'a> {
             let error = error(j).map_or(f64::INFINITY, |error| error * own.unit);
             let unit = what.unit(&site.machine);
             parameters.push(Size { name: what.name(&site.machine), unit, value: self.value(j), error });
-            let is_delay = *what == Nuisance::Delay;
+            let is_delay = matches!(what, Nuisance::Delay(_));
             scatter = is_delay.then(|| stamp::scatter(&self.problem, &self.best.residuals)).flatten();
         }
         if let Some([value, error]) = scatter {
@@ -309,11 +383,12 @@ impl<'a> Tried<'a> {
             estimates[j] = Some(Size { name: own.name.clone(), unit: own.unit, value, error });
         }
         let added = widened(&shift, &errors);
-        let value = self.telling().map_or(0.0, |j| self.value(j));
+        let [value, least] = self.size();
         let fitted = Fitted {
             machine: self.machine(x),
             sizes: &parameters,
             value,
+            least,
             scatter: scatter.map(|[deviation, _]| deviation),
         };
         let Said { mut words, add } = (self.row.words)(site, &self.extended, &fitted);
