@@ -184,7 +184,7 @@ fn tell(trials: &[Trial], tests: &[Test]) {
         let of_area: Vec<&Trial> = trials.iter().filter(|trial| trial.change.file.starts_with(area)).collect();
         let noticed = of_area.iter().filter(|trial| trial.noticed.is_some()).count();
         let endless = of_area.iter().filter(|trial| matches!(trial.noticed, Some((Ended::Not, _)))).count();
-        let unreached = of_area.iter().filter(|trial| trial.noticed.is_none() && reaching(trial) == 0).count();
+        let unreached = of_area.iter().filter(|trial| trial.noticed.is_none() && trial.passed.is_empty() && reaching(trial) == 0).count();
         if !of_area.is_empty() {
             let (name, tried) = (if area.is_empty() { "all" } else { area }, of_area.len());
             let share = 100.0 * noticed as f64 / tried as f64;
@@ -193,8 +193,12 @@ fn tell(trials: &[Trial], tests: &[Test]) {
     }
     println!();
     for trial in trials.iter().filter(|trial| trial.noticed.is_none()) {
-        let (k, change, passed) = (trial.k, trial.change, trial.passed.len());
-        println!("{k:3}  {change}: survives {passed} of {} tests that reach it", reaching(trial));
+        let is_untried = |test: &&Test| test.reached.contains(&trial.k) && !trial.passed.contains(&test.to_string());
+        let untried = match tests.iter().filter(is_untried).count() {
+            0 => String::new(),
+            count => format!("; {count} more reach it"),
+        };
+        println!("{:3}  {}: survives {} tests{untried}", trial.k, trial.change, trial.passed.len());
     }
 }
 
