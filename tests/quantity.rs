@@ -124,6 +124,7 @@ const BAD: &[(&str, &str, &str, &str)] = &[
     ("19,4 mm", "m", "\"19,4 mm\" has a comma in its number", "the decimal sign is a point: \"19.4 mm\""),
     ("1,019.4 mm", "m", "\"1,019.4 mm\" has a comma in its number", "write it without commas: \"1019.4 mm\""),
     ("1 000 mm", "m", "\"1 000 mm\" has a space inside its number", "write the digits together"),
+    ("1 2 mm", "m", "\"1 2 mm\" has a space inside its number", "write the digits together"),
     (
         "3 x 10",
         "",

@@ -118,3 +118,18 @@ impl Motion {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_drag_that_is_the_same_in_both_directions_is_linear() {
+        let side = |viscous, coulomb, breakaway| Side { viscous, coulomb, breakaway };
+        let is_linear = |forward, backward| Friction { forward, backward, ..Friction::default() }.is_linear();
+        assert!(is_linear(side(2.0, 0.0, 0.0), side(2.0, 0.0, 0.0)));
+        assert!(!is_linear(side(2.0, 0.0, 0.0), side(3.0, 0.0, 0.0)));
+        assert!(!is_linear(side(2.0, 0.0, 1.0), side(2.0, 0.0, 1.0)));
+        assert!(!is_linear(side(2.0, 1.0, 1.0), side(2.0, 1.0, 1.0)));
+    }
+}

@@ -290,3 +290,68 @@ fn plant_of(case: &Case, asked: Option<Part>) -> Result<&Case> {
     }
     Ok(case)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::TEMPLATE;
+    use crate::linear::StateSpace;
+
+    fn stage(name: &str) -> Case {
+        Case::read_with(format!("{}/../stages/{name}", env!("CARGO_MANIFEST_DIR")), &[]).unwrap()
+    }
+
+    fn text(exported: &Exported) -> String {
+        exported.files.iter().map(|(_, bytes)| String::from_utf8_lossy(bytes)).collect()
+    }
+
+    fn fact(exported: &Exported, name: &str) -> usize {
+        exported.facts.iter().find(|(own, _)| own == name).and_then(|(_, value)| value.parse().ok()).unwrap()
+    }
+
+    #[test]
+    fn positions_change_by_their_speeds_and_no_pole_is_faster_than_the_bound() {
+        let case = Case::from_text("axis.toml", TEMPLATE).unwrap();
+        let tables = Tables::new(&mechanism(&case)).unwrap();
+        let is_length = |k: &usize| ["m", "rad"].contains(&tables.states[*k].unit);
+        let places: Vec<usize> = (0..tables.states.len()).filter(is_length).collect();
+        assert_eq!(places.len(), 3);
+        // A stretch of a span changes by the speeds of both bodies.
+        for place in places {
+            for weights in &tables.rates[place].weights {
+                let moved: Vec<&str> =
+                    (0..weights.len()).filter(|&k| weights[k] != 0.0).map(|k| tables.states[k].unit).collect();
+                let name = &tables.states[place].name;
+                assert!(
+                    [1, 2].contains(&moved.len()) && moved.iter().all(|unit| unit.ends_with("/s")),
+                    "{name}: {moved:?}"
+                );
+            }
+        }
+        let poles = StateSpace::new(&case.machine, Operation::default()).unwrap().poles().unwrap();
+        let fastest = poles.iter().map(|pole| pole.norm()).fold(0.0, f64::max);
+        assert!((1.0..10.0).contains(&(tables.fastest / fastest)), "{} for {fastest}", tables.fastest);
+    }
+
+    #[test]
+    fn each_rule_of_a_fuzzy_controller_is_in_its_program() {
+        let case = stage("sollmann-jouaneh/controllers/fuzzy-pd.toml");
+        let exported = export(&case, Target::StructuredText, "fuzzy", &Options::default()).unwrap();
+        let text = text(&exported).replace(['(', ')'], "");
+        // Of the 5 × 5 rules each cell between four, behind a zero.
+        assert_eq!(text.matches("high_high := ").count(), 4 * 4 + 1);
+        for rule in ["low_low := -1.0;", "low_high := -0.8;", "high_low := 0.7;", "high_high := 1.0;"] {
+            assert!(text.contains(rule), "{rule} in\n{text}");
+        }
+    }
+
+    /// The fields may turn by 2π, as an electrical angle twice, in a step of any length; a series covers 2.
+    #[test]
+    fn a_short_step_of_a_stepper_has_the_series_of_half_a_turn() {
+        let options = Options { part: Some(Part::Plant), step: Some(1e-7), ..Options::default() };
+        let exported = export(&stage("stepper-axis/stepper-axis.toml"), Target::C, "axis", &options).unwrap();
+        assert_eq!(fact(&exported, "series in a step without an event"), 4);
+        let products = fact(&exported, "products and quotients in a step at most");
+        assert!(products > 4 * fact(&exported, "states") * fact(&exported, "order of a Taylor series"), "{products}");
+    }
+}

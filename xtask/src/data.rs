@@ -177,7 +177,7 @@ fn place(to: &Path, bytes: &[u8]) -> io::Result<()> {
 }
 
 /// SHA-256, as sha256sum prints it.
-fn sum(bytes: &[u8]) -> String {
+pub fn sum(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 

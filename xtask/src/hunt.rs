@@ -22,9 +22,9 @@ pub struct Hunt {
     seconds: u64,
     /// Kills of each command.
     kills: u64,
-    /// Changes of the source.
+    /// Changes of the source, of each of two groups of folders.
     mutants: usize,
-    /// Folders that are changed; all areas where none is named.
+    /// Folders whose changes are tried; all areas where none is named.
     areas: Vec<String>,
     /// Programs of tests that are run; all where none is named.
     tests: Vec<String>,
@@ -36,6 +36,8 @@ pub struct Hunt {
     threads: Option<u64>,
     /// Tests of changes that take longer are left out, s.
     longest: u64,
+    /// Tests of a change end after this time together, s.
+    spend: u64,
     /// True if the stages are told as JSON.
     json: bool,
 }
@@ -62,7 +64,8 @@ const PARTS: [(&str, Part); 6] = [
 
 pub const USAGE: &str = "cargo xtask hunt [--part stages|pairs|dual-belts|readers|faults|mutants]... [--seed S]
                        [--threads N] [--stages N [--json]] [--pairs N] [--dual-belts N] [--seconds B] [--kills N]
-                       [--mutants N [--area FOLDER]... [--tests NAME]... [--longest S] [--list | --only K...]]";
+                       [--mutants N [--area FOLDER]... [--tests NAME]... [--longest S] [--spend S]
+                        [--list | --only K...]]";
 
 impl Hunt {
     /// From the words behind `hunt`. The size of a part names it, too; without any all parts but the mutants, which
@@ -83,6 +86,7 @@ impl Hunt {
             list: false,
             threads: None,
             longest: 120,
+            spend: 600,
             json: false,
         };
         let mut sized = Vec::new();
@@ -121,6 +125,7 @@ impl Hunt {
                 "--only" => hunt.only.push(number()? as usize),
                 "--threads" => hunt.threads = Some(number()?.clamp(1, 256)),
                 "--longest" => hunt.longest = number()?,
+                "--spend" => hunt.spend = number()?,
                 _ => return Err(format!("{word} is not known")),
             }
             let part = match word {
@@ -161,6 +166,7 @@ impl Hunt {
                         programs: &self.tests,
                         only: &self.only,
                         longest: Duration::from_secs(self.longest),
+                        spend: Duration::from_secs(self.spend),
                         threads: self.threads.unwrap_or(2) as usize,
                         list: self.list,
                     };

@@ -283,6 +283,14 @@ mod tests {
         assert_eq!((foot.distance, foot.leg), (0.0, Some(0)));
     }
 
+    #[test]
+    fn the_distance_at_the_end_is_that_of_the_last_point() {
+        let mut gauge = ContourGauge::new(corner());
+        gauge.end(10.0, [0.097, 0.05]);
+        // To the left of the second leg.
+        assert!((gauge.finish(10.0).last - 0.003).abs() < 1e-15);
+    }
+
     /// Two lines there and back, closer to each other than the cart is to its own: it lags, deviates and swings.
     #[test]
     fn lines_that_were_left_do_not_count() {

@@ -145,3 +145,24 @@ fn squares(bins: &[(f64, f64)], kernel: &[(f64, f64)], width: f64, f0: f64, zeta
     }
     bins.iter().zip(&seen).map(|((_, p), g)| ((p - a * g - c) / p).powi(2)).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Acceleration of a vibration excited at its base by white noise of its speed, with a constant floor.
+    #[test]
+    fn the_vibration_of_a_spectrum_leaves_nothing_of_it() {
+        let transmitted = |f: f64, f0: f64, zeta: f64| {
+            let u = f / f0;
+            f * (1.0 + (2.0 * zeta * u).powi(2)) / ((1.0 - u * u).powi(2) + (2.0 * zeta * u).powi(2)) / (f0 * f0)
+        };
+        let bin = |f: f64| (f, 3.0 * transmitted(f, 48.5, 0.05) * 48.5_f64.powi(2) + 2.0);
+        let bins: Vec<(f64, f64)> = (30..70).map(|f| bin(f64::from(f))).collect();
+        let left = |f0: f64, zeta: f64| squares(&bins, &[(0.0, 1.0)], 1.0, f0, zeta);
+        assert!(left(48.5, 0.05) < 1e-20, "{}", left(48.5, 0.05));
+        for (f0, zeta) in [(48.0, 0.05), (49.0, 0.05), (48.5, 0.04), (48.5, 0.06)] {
+            assert!(left(f0, zeta) > 1e-3, "{f0} {zeta}: {}", left(f0, zeta));
+        }
+    }
+}

@@ -434,3 +434,17 @@ impl Observe for Gauge<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_and_the_greatest_force_have_their_times() {
+        let mut span = SpanGauge { force: 0, seen: [Peak::default(); 2] };
+        for (value, time) in [(2.0, 0.1), (-3.0, 0.2), (1.0, 0.3), (-1.0, 0.4)] {
+            span.take(value, time);
+        }
+        assert_eq!(span.seen, [Peak { value: -3.0, time: 0.2 }, Peak { value: 2.0, time: 0.1 }]);
+    }
+}

@@ -65,3 +65,29 @@ impl DisturbanceObserver {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::{Case, TEMPLATE};
+
+    /// v = (1 − e^(−x)) F/d and its integral, by their series, on both sides of the change between formulas.
+    #[test]
+    fn a_mass_with_drag_is_predicted_exactly() {
+        let rigid = Rigid::new(&Case::from_text("axis.toml", TEMPLATE).unwrap().machine);
+        let (rate, push) = (rigid.drag() / rigid.mass, rigid.force_per_command() / rigid.mass);
+        for x in [1e-6, 9e-4, 1.1e-3, 0.3] {
+            let every = x / rate;
+            let observer = DisturbanceObserver::new(&mut Slots::default(), 0.1 * rate, &rigid, every).unwrap();
+            // Σ (−x)^k/(k + order)!
+            let series = |order: u32| -> f64 {
+                let factorial = |n: u32| (1..=n).map(f64::from).product::<f64>();
+                (0..12).map(|k| (-x).powi(k) / factorial(k as u32 + order)).sum()
+            };
+            let expected = [push * every * every * series(2), push * every * series(1), 0.0];
+            for (found, expected) in observer.b.iter().zip(expected) {
+                assert!((found - expected).abs() <= 1e-9 * expected.abs(), "{x}: {found} for {expected}");
+            }
+        }
+    }
+}

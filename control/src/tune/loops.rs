@@ -346,3 +346,24 @@ fn all<const N: usize>(plant: &Plant, sampled: &Sampled<N>, feedback: &Feedback)
     };
     plant.seen(sampled).map(|(_, answer, turn)| one(Open::new(sampled, answer, feedback, turn))).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn check<const N: usize>() {
+        let entry = |i: usize, j: usize| Complex::new(1.0 / (1 + i + j) as f64, (i * j) as f64 - 0.5);
+        let a = Square::<N>::from_fn(entry);
+        let (adjugate, determinant) = inverse(&a);
+        let unit = over(&a, &adjugate, determinant);
+        // For one drive the adjugate is 1: A · 1/det A is 1, too.
+        assert!((unit - diagonal::<N>(Complex::ONE)).iter().all(|z| z.norm() < 1e-12), "{N}");
+    }
+
+    #[test]
+    fn a_matrix_times_its_inverse_is_one() {
+        check::<1>();
+        check::<2>();
+        check::<3>();
+    }
+}

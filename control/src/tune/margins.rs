@@ -486,3 +486,49 @@ impl<'a, const N: usize> Curve<'a, N> {
         (sum / PI).sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+    use crate::linear::Operation;
+
+    const PID: &str = "sollmann-jouaneh/controllers/pid.toml";
+
+    /// The belt is rigid: an undamped resonance makes the loop unstable.
+    fn read(delay: &str) -> (Plant, Feedback) {
+        let file = format!("{}/../stages/{PID}", env!("CARGO_MANIFEST_DIR"));
+        let delay = format!("controller.delay=\"{delay}\"");
+        let case = Case::read_with(file, &[&delay, "belt.model=\"rigid\""]).unwrap();
+        let design = case.controller.as_ref().unwrap();
+        let feedback = Feedback::new(design, &case.machine).unwrap();
+        (Plant::new(&case.machine, Operation::default(), design, &feedback.corners()).unwrap(), feedback)
+    }
+
+    #[test]
+    fn a_loop_that_is_late_by_many_samples_has_infinite_peaks() {
+        let (plant, feedback) = read("0.5 ms");
+        let (peaks, margins) = (Peaks::new(&plant, &feedback), Margins::new(&plant, &feedback));
+        assert!(peaks.is_stable() && margins.stable);
+        assert_eq!(peaks.peaks, [margins.sensitivity, margins.complementary]);
+        let (plant, feedback) = read("60 ms");
+        assert!(!Peaks::new(&plant, &feedback).is_stable() && !Margins::new(&plant, &feedback).stable);
+    }
+
+    /// The peak of a grid is lower than that beside it.
+    #[test]
+    fn no_frequency_beside_a_peak_has_a_larger_value() {
+        let (plant, feedback) = read("0.5 ms");
+        by_drives!(&plant, |sampled| {
+            let mut curve = Curve::on_grid(&plant, sampled, &feedback);
+            curve.divide();
+            for of in [Open::sensitivity, Open::complementary] {
+                let top = curve.highest(of);
+                for beside in [1.0 - 1e-3, 1.0 - 1e-5, 1.0 + 1e-5, 1.0 + 1e-3] {
+                    let value = of(&curve.at(beside * top.omega), top.at);
+                    assert!(value <= top.value * (1.0 + 1e-12), "{value} at {beside} of {}: {}", top.omega, top.value);
+                }
+            }
+        });
+    }
+}

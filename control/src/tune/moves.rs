@@ -128,3 +128,25 @@ fn mean_square(motion: &Move, value: impl Fn(f64) -> f64) -> f64 {
     let square = |k: i32| value(end * (f64::from(k) + 0.5) / f64::from(count)).powi(2);
     (0..count).map(square).sum::<f64>() / f64::from(count) * end / motion.until
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+
+    #[test]
+    fn a_move_takes_half_the_force_that_the_current_leaves_beyond_friction() {
+        let file =
+            format!("{}/../stages/sollmann-jouaneh/controllers/cascade-current.toml", env!("CARGO_MANIFEST_DIR"));
+        for amperes in [2.0, 3.0, 6.0] {
+            let change = format!("controller.cascade.current.limit=\"{amperes} A\"");
+            let case = Case::read_with(&file, &[&change]).unwrap();
+            let (speed, acceleration) = limits(&case.machine, case.controller.as_ref().unwrap());
+            let rigid = Rigid::new(&case.machine);
+            let friction = rigid.coulomb[0] + rigid.viscous[0] * speed;
+            let left = amperes * rigid.force_per_ampere.abs() - friction;
+            let used = rigid.accelerated() * acceleration / left;
+            assert!((used - FORCE).abs() < 1e-9, "{amperes} A: {used} of {left} N");
+        }
+    }
+}

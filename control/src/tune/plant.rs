@@ -209,3 +209,26 @@ fn grid(model: &Discrete, t: f64, corners: &[f64]) -> Vec<f64> {
     frequency.push(most);
     frequency
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::{Case, TEMPLATE};
+    use crate::linear::StateSpace;
+
+    #[test]
+    fn frequencies_rise_from_far_below_all_poles_to_half_the_sampling_rate() {
+        let machine = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
+        let axis = StateSpace::new(&machine, Operation::default()).unwrap();
+        let model = axis.discrete(1e-3, Hold::Zero, 0.0).unwrap();
+        let (most, frequency) = (PI / 1e-3, grid(&model, 1e-3, &[100.0]));
+        assert!((frequency[0] / (LOWEST * most) - 1.0).abs() < 1e-9 && frequency.last() == Some(&most));
+        // A jump of the grid by half a decade would let the phase turn unseen.
+        assert!(frequency.windows(2).all(|pair| pair[0] < pair[1] && pair[1] < 3.0 * pair[0]));
+        // The resonances of the axis are surrounded closely.
+        for swing in axis.poles().unwrap().iter().map(|pole| pole.im).filter(|swing| *swing > 0.0 && *swing < most) {
+            let near = frequency.iter().filter(|omega| (**omega / swing - 1.0).abs() < 0.02).count();
+            assert!(near > 10, "{near} at {swing}");
+        }
+    }
+}

@@ -59,3 +59,20 @@ pub fn layouts(design: &Design, modes: &[f64]) -> Vec<Design> {
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::{Case, TEMPLATE};
+
+    #[test]
+    fn a_pid_starts_from_placements_of_several_dampings() {
+        let change = "controller={ every = \"1 ms\", limit = \"24 V\", pid = { proportional = \"100 V/m\" } }";
+        let case = Case::from_text_with("axis.toml", TEMPLATE, &[change]).unwrap();
+        let design = case.controller.unwrap();
+        let all = starts(&design, &case.machine, None, Some(15.0), 0.8);
+        // 0.8, 0.6 and 1, each about the bandwidth.
+        assert_eq!(all.iter().filter(|(_, hertz)| *hertz == Some(15.0)).count(), 3);
+        assert!(all.iter().all(|(start, _)| start.every == design.every && start.structure != design.structure));
+    }
+}

@@ -96,9 +96,14 @@ mod tests {
     #[test]
     fn finds_the_bottom_of_a_bent_valley() {
         // Rosenbrock's, 0 at (1, 1)
-        let mut valley = |x: &[f64]| (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2);
+        let mut count = 0;
+        let mut valley = |x: &[f64]| {
+            count += 1;
+            (1.0 - x[0]).powi(2) + 100.0 * (x[1] - x[0] * x[0]).powi(2)
+        };
         let found = minimise(&[-1.2, 1.0], 0.3, 1e-8, 2000, &mut valley);
-        assert!(found.value < 1e-12, "{found:?}");
+        // A contraction to the wrong side takes twice as many.
+        assert!(found.value < 1e-12 && count < 250, "{found:?} after {count}");
         assert!((found.x[0] - 1.0).abs() < 1e-5);
     }
 

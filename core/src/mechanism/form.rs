@@ -188,6 +188,18 @@ mod tests {
         Mechanism::new(vec![body(0), body(1)], vec![spring], Vec::new())
     }
 
+    #[test]
+    fn a_stretch_is_the_sum_of_positions_times_their_arms() {
+        let mut mechanism = mechanism();
+        mechanism.springs[0].arms = vec![(0, 0.02), (1, -1.0)];
+        let form = Form::stretch(0) * 3.0;
+        let row = form.on_state(&mechanism);
+        assert!((row.position[0] - 0.06).abs() < 1e-15 && row.position[1] == -3.0, "{row:?}");
+        let mut state = State::default();
+        state.position[..2].copy_from_slice(&[50.0, 0.4]);
+        assert!((form.value(&mechanism, &state, &[0.0; DRIVES]) - 3.0 * (0.02 * 50.0 - 0.4)).abs() < 1e-12);
+    }
+
     /// The remainder of terms that cancel is rounding, at most the noise, for any order of the terms.
     #[test]
     fn noise_is_at_least_the_remainder_of_parts_that_cancel() {

@@ -373,3 +373,31 @@ impl Switch {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conditions_that_hold_together_have_different_numbers() {
+        let limits = [Limit::Inside, Limit::High, Limit::Low];
+        let mut kinds: Vec<usize> = Vec::new();
+        for body in 0..BODIES {
+            kinds.extend([Cause::Stop(body), Cause::BreakBackward(body)].map(Cause::kind));
+        }
+        for drive in 0..DRIVES {
+            kinds.push(Cause::GearTorque(drive).kind());
+            kinds.extend(limits.map(|to| Cause::Switch(Switch::Voltage(drive, to)).kind()));
+            kinds.extend(limits.map(|to| Cause::Switch(Switch::Current(drive, to)).kind()));
+            kinds.extend([1, 3].map(|to| Cause::Switch(Switch::Field(drive, to)).kind()));
+        }
+        for spring in 0..SPRINGS {
+            let contacts = [Contact::Apart, Contact::High, Contact::Low];
+            kinds.extend(contacts.map(|to| Cause::Switch(Switch::Gap(spring, to)).kind()));
+        }
+        let count = kinds.len();
+        kinds.sort_unstable();
+        kinds.dedup();
+        assert_eq!((kinds.len(), kinds.last()), (count, Some(&(Cause::KINDS - 1))));
+    }
+}

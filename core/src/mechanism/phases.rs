@@ -279,3 +279,43 @@ impl Mechanism {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn phases() -> Phases {
+        Phases {
+            teeth: 50.0,
+            torque_constant: 0.3,
+            detent_torque: 0.02,
+            resistance: 1.5,
+            inductance: 3e-3,
+            supply: 24.0,
+            amplitude: 2.0,
+            regulator: None,
+        }
+    }
+
+    #[test]
+    fn without_current_the_detent_torque_is_a_sine_of_four_periods_per_field() {
+        for k in -20..20 {
+            let angle = 1e-3 * f64::from(k);
+            let epsilon = 50.0 * angle + FRAC_PI_4;
+            let (torque, _) = phases().torque(angle, [0.0; 2]);
+            assert!((torque + 0.02 * (4.0 * epsilon).sin()).abs() < 1e-15, "{angle}");
+        }
+    }
+
+    #[test]
+    fn derivatives_of_the_torque_are_those_of_differences() {
+        let of = |[angle, a, b]: [f64; 3]| phases().torque(angle, [a, b]).0;
+        let (at, steps) = ([0.013, 1.3, -0.7], [1e-6, 1e-4, 1e-4]);
+        let (_, slopes) = phases().torque(at[0], [at[1], at[2]]);
+        for (k, slope) in slopes.into_iter().enumerate() {
+            let moved = |side: f64| std::array::from_fn(|j| at[j] + if j == k { side * steps[k] } else { 0.0 });
+            let difference = (of(moved(1.0)) - of(moved(-1.0))) / (2.0 * steps[k]);
+            assert!((slope - difference).abs() < 1e-6 * slope.abs(), "{k}: {slope} for {difference}");
+        }
+    }
+}

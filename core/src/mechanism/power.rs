@@ -158,3 +158,56 @@ impl Mechanism {
         power
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::friction::Friction;
+    use crate::mechanism::{Body, Label, MotionKind, Spring};
+
+    /// A mass of 2 kg with friction and one of 3 kg without, between which is a damped spring.
+    fn pair() -> Mechanism {
+        let label = Label { key: "part", name: "part" };
+        let body = |index: usize, inertia: f64, friction: Friction| Body {
+            label,
+            kind: MotionKind::Linear,
+            inertia,
+            friction,
+            force: 0.0,
+            along: None,
+            leader: (index, 1.0),
+            is_rotor: false,
+        };
+        let arms = vec![(0, 1.0), (1, -1.0)];
+        let spring = Spring { label, arms, stiffness: 1e3, damping: 5.0, law: SpringLaw::TwoSided, follows: None };
+        let bodies = vec![body(0, 2.0, Friction::symmetric(4.0, 1.0)), body(1, 3.0, Friction::default())];
+        Mechanism::new(bodies, vec![spring], Vec::new())
+    }
+
+    fn state(position: [f64; 2], speed: [f64; 2]) -> State {
+        let mut state = State::default();
+        state.position[..2].copy_from_slice(&position);
+        state.speed[..2].copy_from_slice(&speed);
+        state
+    }
+
+    #[test]
+    fn energy_is_that_of_masses_and_spring() {
+        assert_eq!(pair().energy(&State::default()), 0.0);
+        // ½ 2 · 0.5² + ½ 3 · 0.2² + ½ 1000 · 0.01²
+        let energy = pair().energy(&state([0.03, 0.02], [0.5, -0.2]));
+        assert!((energy - (0.25 + 0.06 + 0.05)).abs() < 1e-12, "{energy}");
+    }
+
+    #[test]
+    fn power_is_balanced_in_both_directions() {
+        for speed in [0.5, -0.5] {
+            let (pair, state) = (pair(), state([0.03, 0.02], [speed, -0.2]));
+            let power = pair.power(pair.first_mode(&state), &state, &[0.0; DRIVES]);
+            // b v² + F_c |v|, c ṡ²
+            assert!((power.friction[0] - (4.0 * 0.25 + 0.5)).abs() < 1e-12, "{power:?}");
+            assert!((power.spring[0] - 5.0 * (speed + 0.2).powi(2)).abs() < 1e-12, "{power:?}");
+            assert!(power.imbalance().abs() < 1e-12, "{power:?}");
+        }
+    }
+}

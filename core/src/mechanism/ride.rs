@@ -206,3 +206,43 @@ impl Mechanism {
         vec![(bridge, yaw, mass * y), (yaw, bridge, mass * y), (yaw, yaw, mass * y * y)]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_are_those_of_differences() {
+        let law = RideLaw { mass: 2.0, inertia: 0.3, gravity: 0.4, free: 1.2, cart: 1.0 };
+        let at = Riding {
+            cart: 0.2,
+            cart_speed: -0.5,
+            yaw: 0.1,
+            yaw_speed: 0.7,
+            bridge_free: 3.0,
+            cart_free: -1.5,
+            yaw_free: 4.0,
+        };
+        let parts: [fn(&mut Riding) -> &mut f64; 7] = [
+            |at| &mut at.cart,
+            |at| &mut at.cart_speed,
+            |at| &mut at.yaw,
+            |at| &mut at.yaw_speed,
+            |at| &mut at.bridge_free,
+            |at| &mut at.cart_free,
+            |at| &mut at.yaw_free,
+        ];
+        for on in Ridden::ALL {
+            let mut slopes = law.slopes(on, &at);
+            for (k, part) in parts.iter().enumerate() {
+                let beside = |step: f64| {
+                    let mut moved = at;
+                    *part(&mut moved) += step;
+                    law.force(on, &moved)
+                };
+                let (slope, difference) = (*part(&mut slopes), (beside(1e-5) - beside(-1e-5)) / 2e-5);
+                assert!((slope - difference).abs() < 1e-7 * slope.abs().max(1.0), "{k}: {slope} for {difference}");
+            }
+        }
+    }
+}

@@ -216,6 +216,29 @@ mod tests {
         }
     }
 
+    /// Also of a rotor whose gear is a spring on a pulley whose own coordinate is a stretch.
+    #[test]
+    fn a_position_is_its_weights_on_the_coordinates() {
+        let (base, r) = mechanism();
+        let (mut bodies, mut springs) = (base.bodies.clone(), base.springs.clone());
+        bodies.push(Body { leader: (3, 1.0), ..bodies[DRIVE].clone() });
+        springs.push(Spring { arms: vec![(3, 5.0 * r), (DRIVE, -r)], ..springs[0].clone() });
+        let mechanism = Mechanism::new(bodies, springs, Vec::new());
+        let layout = Layout::new(&mechanism);
+        let mut start = at(0.3 / r, 0.3, 0.3 / r);
+        start.position[3] = 0.06 / r;
+        let (coordinates, mut inner) = Coordinates::new(&layout, &start);
+        for (k, own) in inner.position.iter_mut().enumerate().take(4) {
+            *own += 1e-3 * (k as f64 + 1.0);
+        }
+        let state = coordinates.state(&layout, &inner);
+        for body in 0..4 {
+            let (weights, constant) = coordinates.way(&layout, body);
+            let way = weights.iter().zip(&inner.position).map(|(weight, own)| weight * own).sum::<f64>() + constant;
+            assert!((way - state.position[body]).abs() < 1e-12, "{body}: {way} for {}", state.position[body]);
+        }
+    }
+
     #[test]
     fn a_strain_that_is_meant_is_kept_far_from_the_origin() {
         let (mechanism, r) = mechanism();

@@ -290,6 +290,15 @@ mod tests {
         assert!((root - 0.3).abs() < 1e-14, "{root}");
     }
 
+    #[test]
+    fn the_extremum_of_a_parabola_is_its_vertex() {
+        // 1 + 3 s − 5 s²: 1.45 at 0.3
+        let (s, value) = only_extremum(&[1.0, 3.0, -5.0], 1.0, [3.0, -7.0]);
+        assert!((s - 0.3).abs() < 1e-15 && (value - 1.45).abs() < 1e-15, "{value} at {s}");
+        let (s, value) = only_extremum(&[-1.0, -3.0, 5.0], -1.0, [3.0, -7.0]);
+        assert!((s - 0.3).abs() < 1e-15 && (value + 1.45).abs() < 1e-15, "{value} at {s}");
+    }
+
     /// Oscillations with a slow part, like guards: the steps find the same zeros as the hulls of Bernstein
     /// coefficients.
     #[test]

@@ -78,3 +78,17 @@ impl Rounding {
         PositionError { value: value.min(f64::MAX), way: self.way }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_position_far_from_the_origin_has_the_rounding_of_its_size() {
+        let rest = Rounding::default();
+        assert_eq!(rest.bound(1000, 1.0, (0.0, 0.0)).value, 0.0);
+        assert_eq!(rest.bound(1000, 1.0, (-1e3, 0.0)).value, 2e3 * f64::EPSILON);
+        // What has grown is added to that.
+        assert_eq!(rest.bound(1000, 1.0, (1e3, 1e-9)).value, 1e-9 + 2e3 * f64::EPSILON);
+    }
+}

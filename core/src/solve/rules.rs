@@ -368,3 +368,17 @@ pub(super) fn note_tie<B: Between>(solver: &mut B, body: usize) {
     let rules = solver.rules_mut();
     tie.note(&mut rules.ties, &rules.events);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_condition_that_has_changed_is_zero_to_its_order_until_it_is_refreshed() {
+        let mut rules = Rules::new(Mode::new(std::iter::empty()));
+        rules.start_fresh(Cause::Stop(1), 2);
+        assert_eq!([Cause::Stop(1), Cause::BreakForward(1), Cause::Stop(0)].map(|c| rules.fresh_order(c)), [2, 0, 0]);
+        rules.refreshed();
+        assert_eq!(rules.fresh_order(Cause::Stop(1)), 0);
+    }
+}

@@ -118,3 +118,28 @@ pub(super) fn restored<T: Clone>(own: &T, saved: &[u64], pass: impl FnOnce(&mut 
 fn one_of<T: Copy, const N: usize>(all: [T; N], place: u64) -> Option<T> {
     all.get(usize::try_from(place).ok()?).copied()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_passed_out_comes_back() {
+        let mut list = Vec::new();
+        let mut out = Pass::Out(&mut list);
+        out.optional(&mut Some(-0.5)).unwrap();
+        out.optional(&mut None).unwrap();
+        out.count(&mut 7).unwrap();
+        out.flag(&mut true).unwrap();
+        let (mut some, mut none, mut count, mut flag) = (None, Some(3.0), 0, false);
+        let mut back = Pass::In(list.iter());
+        back.optional(&mut some).unwrap();
+        back.optional(&mut none).unwrap();
+        back.count(&mut count).unwrap();
+        back.flag(&mut flag).unwrap();
+        assert_eq!((some, none, count, flag), (Some(-0.5), None, 7, true));
+        assert!(back.flag(&mut flag).is_none());
+        // A flag is 0 or 1.
+        assert!(Pass::In([2].iter()).flag(&mut flag).is_none());
+    }
+}

@@ -86,3 +86,22 @@ impl Archive {
         Ok(self.bytes)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_has_the_earliest_date_and_its_sum() {
+        let mut archive = Archive::new();
+        archive.add("a.txt", b"123456789").unwrap();
+        assert!(archive.add("a.txt", b"").unwrap_err().to_string().contains("twice"));
+        let bytes = archive.finish().unwrap();
+        let word = |at: usize| u16::from_le_bytes([bytes[at], bytes[at + 1]]);
+        // Local header: stored, 0:00 on the first of January 1980.
+        assert_eq!((&bytes[..4], word(8), word(10), word(12)), (&b"PK\x03\x04"[..], 0, 0, 1 << 5 | 1));
+        // CRC-32 of these digits, by which its implementations are compared.
+        assert_eq!(bytes[14..18], 0xcbf4_3926_u32.to_le_bytes());
+        assert_eq!(&bytes[30..44], b"a.txt123456789");
+    }
+}

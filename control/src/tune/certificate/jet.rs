@@ -189,6 +189,14 @@ mod tests {
     }
 
     #[test]
+    fn a_modulus_neither_overflows_nor_underflows() {
+        for scale in [1.0, 1e-200, 1e200] {
+            let found = modulus(Complex::new(-3.0 * scale, 4.0 * scale));
+            assert!((found / (5.0 * scale) - 1.0).abs() < 1e-15, "{found}");
+        }
+    }
+
+    #[test]
     fn an_inverse_of_what_may_be_zero_has_no_bound() {
         assert_eq!(Jet::turning_less_one(0.0, 0.1).inverse().radius, f64::INFINITY);
     }

@@ -111,3 +111,50 @@ impl Tensor {
         sums
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// f = 1 + 2 t + 3 t² + s (4 − t − 2 t²) and g = −f/2.
+    fn pair() -> Tensor {
+        let values = [1.0, 2.0, 3.0, 4.0, -1.0, -2.0].iter().flat_map(|c| [*c, -0.5 * c]).collect();
+        Tensor { shape: vec![2, 3], channels: 2, values }
+    }
+
+    fn f(s: f64, t: f64) -> f64 {
+        1.0 + 2.0 * t + 3.0 * t * t + s * (4.0 - t - 2.0 * t * t)
+    }
+
+    const POINTS: [[f64; 2]; 5] = [[0.0, 0.0], [1.0, -1.0], [-0.3, 0.7], [0.9, 0.2], [-1.0, -1.0]];
+
+    #[test]
+    fn values_are_those_of_the_polynomials() {
+        for [s, t] in POINTS {
+            let found = pair().at(&[s, t]);
+            assert!((found[0] - f(s, t)).abs() < 1e-14 && (found[1] + 0.5 * f(s, t)).abs() < 1e-14, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_part_of_the_box_has_the_values_of_the_whole_there() {
+        let mut part = pair();
+        part.narrow(1, 0.25, 0.5);
+        for [s, t] in POINTS {
+            assert!((part.at(&[s, t])[0] - f(s, 0.25 + 0.5 * t)).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn values_lie_between_the_coefficients_of_bernsteins_form() {
+        let mut form = pair();
+        (0..2).for_each(|parameter| form.bernstein_form(parameter));
+        let all: Vec<f64> = (0..form.count()).map(|number| form.channels_of(number)[0]).collect();
+        let (low, high) = all.iter().fold((f64::MAX, f64::MIN), |(low, high), b| (low.min(*b), high.max(*b)));
+        for [s, t] in POINTS {
+            assert!((low - 1e-14..=high + 1e-14).contains(&f(s, t)), "{low} {high}");
+        }
+        // At the corners they are the values themselves: f(−1, −1) = −1 and f(1, 1) = 7.
+        assert!((all[0] - f(-1.0, -1.0)).abs() < 1e-14 && (all[5] - f(1.0, 1.0)).abs() < 1e-14);
+    }
+}

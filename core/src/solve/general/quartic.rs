@@ -103,3 +103,21 @@ fn stays_on_its_side(values: &[f64; POINTS]) -> bool {
     let (least, most) = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), v| (l.min(*v), m.max(*v)));
     most - least < least.max(-most)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn both_ends_of_an_interval_as_long_as_a_part_are_found() {
+        let count = (NODES * PARTS) as f64;
+        let near = 0.5_f64.powi(HALVINGS as i32) / count;
+        for part in 1..NODES * PARTS {
+            let (from, to) = ((part as f64 - 0.4) / count, (part as f64 + 0.3) / count);
+            let mut found = Vec::new();
+            places(|s| s > from && s < to, |s, now| found.push((s, now)));
+            let [(rises, true), (falls, false)] = found[..] else { panic!("{part}: {found:?}") };
+            assert!((rises - from).abs() < near && (falls - to).abs() < near, "{part}: {found:?}");
+        }
+    }
+}

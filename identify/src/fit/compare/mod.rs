@@ -442,3 +442,28 @@ fn without_windows(text: &str) -> String {
     }
     document.to_string()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_of_a_mean_is_the_deviation_over_the_root_of_the_number() {
+        let mut candidate = Candidate {
+            law: FrictionLaw::Coulomb,
+            sided: false,
+            window: None,
+            parameters: 2,
+            training: 1.0,
+            held_out: 1.0,
+            error: 0.0,
+            squares: vec![2.0, 5.0, 4.0, 9.0],
+            failed: None,
+        };
+        // Differences 1, 3, 1, 3: deviation √(4/3), over √4
+        let error = standard_error(&candidate, &[1.0, 2.0, 3.0, 6.0]);
+        assert!((error - (1.0f64 / 3.0).sqrt()).abs() < 1e-15, "{error}");
+        candidate.squares.pop();
+        assert_eq!(standard_error(&candidate, &[1.0, 2.0, 3.0, 6.0]), 0.0);
+    }
+}

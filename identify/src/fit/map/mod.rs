@@ -360,3 +360,32 @@ impl ForceMap {
         self.components.iter().any(|component| component.origins.iter().any(is_turn))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::TEMPLATE;
+
+    /// A line through points is off a parabola by h² F″/12 in the mean, a Gaussian of deviation σ by σ² F″/2.
+    #[test]
+    fn the_band_of_a_parabola_is_what_points_and_smoothing_take() {
+        let case = Case::from_text("axis.toml", TEMPLATE).unwrap();
+        let (steep, smoothing, speed) = (40.0, 1e-3, 0.05);
+        let pass = |is_forward: bool| {
+            let row = |k: u32| {
+                let x = 2e-3 * f64::from(k);
+                [x, 0.5 * steep * x * x + if is_forward { 2.0 } else { -2.0 }]
+            };
+            Pass { is_forward, rows: (0..120).map(row).collect(), speed, smoothing }
+        };
+        let map = of_passes(&case, vec![pass(true), pass(false)]).unwrap();
+        assert_eq!((map.passes, map.speed), ([1, 1], speed));
+        assert!((map.friction - 2.0).abs() < 1e-9, "{}", map.friction);
+        let step = map.points[1].position - map.points[0].position;
+        let half = steep * (step * step / 12.0 + 0.5 * smoothing * smoothing);
+        for Point { force, band: [low, high], .. } in &map.points[5..map.points.len() - 5] {
+            assert!(((high - force) / half - 1.0).abs() < 0.01, "{force} {low} {high}: {half}");
+            assert!(((force - low) / half - 1.0).abs() < 0.01, "{force} {low} {high}: {half}");
+        }
+    }
+}

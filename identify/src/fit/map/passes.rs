@@ -185,3 +185,26 @@ fn usual(values: impl Iterator<Item = f64> + Clone) -> f64 {
     let most = values.clone().fold(f64::MIN_POSITIVE, f64::max);
     middle(values.filter(|value| *value > 0.1 * most)).max(f64::MIN_POSITIVE)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_squares_line_of_a_broken_line_is_that_line() {
+        let nodes = [1.0, -2.0, 0.5, 4.0, 3.0];
+        let (low, step) = (0.1, 0.02);
+        let rows = (0..400).map(|k| {
+            let place = 0.01 * f64::from(k);
+            let (i, share) = (place as usize, place.fract());
+            [low + step * place, nodes[i] + share * (nodes[i + 1] - nodes[i])]
+        });
+        let pass = Pass { is_forward: true, rows: rows.collect(), speed: 0.1, smoothing: 0.0 };
+        let found = pass.line(low, step, nodes.len()).unwrap();
+        for (found, node) in found.iter().zip(nodes) {
+            assert!((found - node).abs() < 1e-9, "{found} for {node}");
+        }
+        // Points beyond the rows have none.
+        assert!(pass.line(low, step, nodes.len() + 2).is_none());
+    }
+}

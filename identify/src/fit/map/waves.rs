@@ -225,3 +225,55 @@ fn errors(values: &[f64], numbers: &[f64], step: f64) -> Option<Vec<Errors>> {
     };
     Some((0..numbers.len()).map(of).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chance::normal;
+    use rand_pcg::Pcg64;
+    use rand_pcg::rand_core::SeedableRng;
+
+    const STEP: f64 = 4e-3;
+
+    /// 3 N at 25.3/m and 1 N at 62.7/m on a slope, at 250 points.
+    fn force(j: usize) -> f64 {
+        let x = STEP * j as f64;
+        5.0 + 2.0 * x + 3.0 * (2.0 * PI * 25.3 * x).sin() + (2.0 * PI * 62.7 * x + 0.4).cos()
+    }
+
+    #[test]
+    fn amplitudes_of_two_sines_are_both_found() {
+        let values: Vec<f64> = (0..250).map(force).collect();
+        let all = errors(&values, &[25.3, 62.7], STEP).unwrap();
+        assert!((all[0].size - 3.0).abs() < 1e-9 && (all[1].size - 1.0).abs() < 1e-9);
+        // √(2/n) of each by itself; neighbours and the cubic add little.
+        assert!(all.iter().all(|own| (0.9..1.1).contains(&own.inflation)));
+    }
+
+    #[test]
+    fn sines_are_found_with_their_wave_numbers_and_errors() {
+        let mut random = Pcg64::seed_from_u64(3);
+        let mut noise = || (0..250).map(|_| 0.1 * normal(&mut random)).collect::<Vec<f64>>();
+        let values: Vec<f64> = noise().iter().enumerate().map(|(j, noise)| force(j) + noise).collect();
+        let residuals: Vec<Vec<f64>> = (0..8).map(|_| noise()).collect();
+        let noise = Noise { residuals: &residuals, freedom: 8.0, weight: 1.0, step: STEP };
+        let found = search(&values, &noise, 100.0);
+        assert!(found.changes && found.waves.len() == 2);
+        for (wave, (number, amplitude)) in found.waves.iter().zip([(25.3, 3.0), (62.7, 1.0)]) {
+            assert!((wave.number[0] - number).abs() < 4.0 * wave.number[1], "{wave:?}");
+            assert!((wave.amplitude[0] - amplitude).abs() < 4.0 * wave.amplitude[1], "{wave:?}");
+            // σ √(2/n) = 0.0089 N
+            assert!((wave.amplitude[1] / 0.0089 - 1.0).abs() < 0.5, "{wave:?}");
+        }
+        // A tenth of a newton is clear only at its own wave number, not a period per length away.
+        let weak: Vec<f64> = residuals[0]
+            .iter()
+            .enumerate()
+            .map(|(j, own)| own + 0.1 * (2.0 * PI * 26.0 * STEP * j as f64).sin())
+            .collect();
+        let found = search(&weak, &noise, 100.0).waves;
+        assert!(found.len() == 1 && (found[0].number[0] - 26.0).abs() < 4.0 * found[0].number[1], "{found:?}");
+        let none = search(&residuals[0], &noise, 100.0);
+        assert!(!none.changes && none.waves.is_empty() && none.visible < 0.1);
+    }
+}

@@ -155,3 +155,74 @@ fn innovations_of<const S: usize>(
         each(&mut v, f);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{DMatrix, DVector};
+
+    /// Rows at uneven times: a column that is not of the Jacobian, and the residual.
+    fn uneven() -> Series {
+        let time: Vec<f64> = (0..25).map(|k| 0.01 * f64::from(k) + 0.004 * f64::from(k % 3)).collect();
+        let rows = (0..25).flat_map(|k| [f64::from(k).sin(), (0.7 * f64::from(k)).cos()]).collect();
+        Series {
+            moved: Vec::new(),
+            own: 0,
+            more: 1,
+            rows,
+            gain: (0..25).map(|k| 1.0 + 0.1 * f64::from(k % 4)).collect(),
+            value: time.clone(),
+            speed: time.clone(),
+            time,
+        }
+    }
+
+    /// The filter computes yᵀ (I + G R G)⁻¹ y and ln det (I + G R G) with the noise's autocovariance R.
+    #[test]
+    fn a_filter_agrees_with_the_covariance_of_its_noise() {
+        let slow = |variance, time, frequency| Slow { variance, time, frequency };
+        let series = uneven();
+        for noises in [
+            vec![],
+            vec![slow(2.0, 0.05, 0.0)],
+            vec![slow(2.0, 0.02, 0.0), slow(5.0, 0.3, 0.0)],
+            vec![slow(3.0, 0.1, 60.0)],
+        ] {
+            let covariance = |past: f64| -> f64 {
+                let of = |slow: &Slow| {
+                    let (turn, gamma) = (slow.frequency * past, 1.0 / slow.time);
+                    let swing =
+                        if slow.frequency > 0.0 { turn.cos() + gamma / slow.frequency * turn.sin() } else { 1.0 };
+                    slow.variance * (-gamma * past).exp() * swing
+                };
+                noises.iter().map(of).sum()
+            };
+            let n = series.time.len();
+            let whole = DMatrix::from_fn(n, n, |i, j| {
+                let past = (series.time[i] - series.time[j]).abs();
+                series.gain[i] * series.gain[j] * covariance(past) + if i == j { 1.0 } else { 0.0 }
+            });
+            let column = |c: usize| DVector::from_fn(n, |k, _| series.rows[2 * k + c]);
+            let factor = whole.cholesky().unwrap();
+            let (products, logs) = filter(&series, &noises);
+            for (i, j) in [(0, 0), (0, 1), (1, 1)] {
+                let expected = column(i).dot(&factor.solve(&column(j)));
+                let found = products[2 * i + j];
+                assert!((found - expected).abs() < 1e-9, "{noises:?}: {found} for {expected}");
+            }
+            assert!((logs - factor.determinant().ln()).abs() < 1e-9, "{noises:?}");
+        }
+    }
+
+    #[test]
+    fn columns_that_were_appended_are_taken_back() {
+        let mut series = uneven();
+        let (rows, columns) = (series.rows.clone(), [vec![1.0; 25], vec![2.0; 25]]);
+        series.append(&columns);
+        assert_eq!((series.more, series.wide()), (3, 4));
+        assert_eq!(series.rows[..4], [rows[0], 1.0, 2.0, rows[1]]);
+        series.take_back();
+        let residuals: Vec<f64> = rows.chunks(2).map(|row| row[1]).collect();
+        assert_eq!((series.more, &series.rows), (0, &residuals));
+    }
+}

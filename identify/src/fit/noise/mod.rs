@@ -646,4 +646,42 @@ mod tests {
             assert!(root > 5.0 || (zero(&normal, 0.0, 20.0) - root).abs() < 1e-9, "{root}");
         }
     }
+
+    /// Bisection alone would take 40.
+    #[test]
+    fn a_zero_of_a_smooth_function_takes_few_evaluations() {
+        for root in [0.3, 0.5, 1.7] {
+            let count = std::cell::Cell::new(0);
+            let normal = |x: f64| {
+                count.set(count.get() + 1);
+                libm::erfc(x) - libm::erfc(root)
+            };
+            assert!((zero(&normal, 0.0, 20.0) - root).abs() < 1e-9);
+            assert!(count.get() < 20, "{root}: {}", count.get());
+        }
+    }
+
+    fn white(variance: f64, shift: f64) -> Spread {
+        let square = DMatrix::from_element(1, 1, variance);
+        Spread {
+            parts: vec![(1.0, square.clone(), None)],
+            freedom: 1e6,
+            shift: DVector::from_element(1, shift),
+            covariance: square,
+            slow: Vec::new(),
+            waves: Vec::new(),
+            unevenness: 1.0,
+        }
+    }
+
+    #[test]
+    fn an_interval_of_white_noise_is_that_of_the_normal_distribution() {
+        let one = DVector::from_element(1, 1.0);
+        assert!((white(4.0, 0.0).half_width(&one) - 2.0 * 1.95996).abs() < 1e-3);
+        // A shift far beyond the noise is exceeded on one side only: d + 1.645 σ.
+        assert!((white(4.0, 30.0).half_width(&one) - (30.0 + 2.0 * 1.64485)).abs() < 1e-3);
+        // Independent quantities: √(3² + 4²) = 5
+        let both = half_width(&[white(9.0, 0.0), white(16.0, 0.0)], &one);
+        assert!((both - 5.0 * 1.95996).abs() < 2e-3, "{both}");
+    }
 }

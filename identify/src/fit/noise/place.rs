@@ -99,3 +99,30 @@ pub(super) fn columns(series: &Series, kappa: f64) -> [Vec<f64>; 2] {
     };
     [of(f64::cos), of(f64::sin)]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wave_is_found_with_its_amplitude_and_likelihood() {
+        let (kappa, n) = (40.0, 200);
+        let value: Vec<f64> = (0..n).map(|k| 0.002 * f64::from(k)).collect();
+        let rows: Vec<f64> = value.iter().map(|x| 0.3 * (kappa * x).cos() - 0.4 * (kappa * x).sin()).collect();
+        let square: f64 = rows.iter().map(|r| r * r).sum();
+        let series = Series {
+            moved: Vec::new(),
+            own: 0,
+            more: 0,
+            rows,
+            gain: vec![1.0; n as usize],
+            time: value.clone(),
+            speed: value.clone(),
+            value,
+        };
+        let (gained, amplitude) = gain(&[series], &[], &[], kappa);
+        assert!((amplitude - 0.5).abs() < 1e-12, "{amplitude}");
+        // It explains all: ½ Σ r²
+        assert!((gained - 0.5 * square).abs() < 1e-9 * square, "{gained}");
+    }
+}

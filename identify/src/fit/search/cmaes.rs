@@ -102,6 +102,27 @@ mod tests {
         assert!((best.1[0] - 1.0).abs() < 0.2 && (best.1[1] - 1.0).abs() < 0.4, "{best:?}");
     }
 
+    /// E‖p_σ‖ = E‖N(0, I)‖ where costs are chance: the step length then neither grows nor shrinks.
+    #[test]
+    fn the_step_length_stays_where_costs_are_chance() {
+        let (n, lambda, searches) = (4, 8, 20);
+        let mut growth = 0.0;
+        for seed in 0..searches {
+            let mut random = Pcg64::seed_from_u64(seed);
+            let mut all = Vec::new();
+            search(n, 1.0, 1000, &mut |x| {
+                all.push(x.clone());
+                (normal(&mut random), true)
+            });
+            let spread = |points: &[DVector<f64>]| {
+                let mean = points.iter().sum::<DVector<f64>>() / points.len() as f64;
+                points.iter().map(|x| (x - &mean).norm_squared()).sum::<f64>().sqrt()
+            };
+            growth += (spread(&all[all.len() - lambda..]) / spread(&all[..lambda])).ln() / searches as f64;
+        }
+        assert!(growth.abs() < 1.0, "e^{growth}");
+    }
+
     #[test]
     fn a_search_ends_where_nothing_has_a_cost() {
         let mut count = 0;

@@ -533,3 +533,15 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
     }
     noise
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn efforts_add_up() {
+        let mut work = Work { iterations: 1, evaluations: 20, simulations: 300 };
+        work.add(&Work { iterations: 4, evaluations: 50, simulations: 600 });
+        assert_eq!(work, Work { iterations: 5, evaluations: 70, simulations: 900 });
+    }
+}

@@ -22,10 +22,12 @@ pub struct Change {
     kind: ChangeKind,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 enum ChangeKind {
     /// An expression becomes another.
     Expression,
+    /// A comparison gets another operator; a test reaches it only where the two results differ.
+    Comparison { left: String, right: String, was: &'static str, will: &'static str },
     /// A statement is left out.
     Statement,
     /// The body of a function begins with a return.
@@ -33,11 +35,19 @@ enum ChangeKind {
 }
 
 impl Change {
+    /// True if it is in this folder, or in the file beside it that is its module.
+    pub fn is_in(&self, folder: &str) -> bool {
+        self.file.strip_prefix(folder).is_some_and(|rest| rest.starts_with(['/', '.']))
+    }
+
     /// The changed text, with the original one where number `k` is not turned on.
     pub fn switched(&self, k: usize) -> String {
         let (was, will) = (&self.was, &self.will);
-        match self.kind {
+        match &self.kind {
             ChangeKind::Expression => format!("(if crate::mutant::on({k}) {{ {will} }} else {{ {was} }})"),
+            ChangeKind::Comparison { left, right, was, will } => format!(
+                "(match (&({left}), &({right})) {{ (l, r) => crate::mutant::pick({k}, *l {was} *r, *l {will} *r) }})"
+            ),
             ChangeKind::Statement => format!("if !crate::mutant::on({k}) {{ {was} }}"),
             ChangeKind::Return => format!("{{ if crate::mutant::on({k}) {{ return {will}; }} {was} }}"),
         }
@@ -52,7 +62,9 @@ impl fmt::Display for Change {
         };
         write!(f, "{}:{} {}: ", self.file, self.line, self.within)?;
         match self.kind {
-            ChangeKind::Expression => write!(f, "`{}` becomes `{}`", short(&self.was), short(&self.will)),
+            ChangeKind::Expression | ChangeKind::Comparison { .. } => {
+                write!(f, "`{}` becomes `{}`", short(&self.was), short(&self.will))
+            }
             ChangeKind::Statement => write!(f, "`{}` is left out", short(&self.was)),
             ChangeKind::Return => write!(f, "returns `{}` at once", self.will),
         }
@@ -70,11 +82,17 @@ pub fn all(folder: &str, changes: &mut Vec<Change>) -> Result<(), String> {
     files.sort();
     for file in files {
         let text = std::fs::read_to_string(&file).map_err(|error| format!("{file}: {error}"))?;
-        let parsed = syn::parse_file(&text).map_err(|error| format!("{file}: {error}"))?;
-        let mut finder = Finder { file: &file, text: &text, within: Vec::new(), changes };
-        finder.visit_file(&parsed);
+        changes.extend(of_text(&file, &text)?);
     }
     Ok(())
+}
+
+/// All changes of the text of a file.
+pub fn of_text(file: &str, text: &str) -> Result<Vec<Change>, String> {
+    let parsed = syn::parse_file(text).map_err(|error| format!("{file}: {error}"))?;
+    let mut finder = Finder { file, text, within: Vec::new(), changes: Vec::new() };
+    finder.visit_file(&parsed);
+    Ok(finder.changes)
 }
 
 fn gather(folder: &str, files: &mut Vec<String>) -> Result<(), String> {
@@ -102,7 +120,7 @@ struct Finder<'a> {
     file: &'a str,
     text: &'a str,
     within: Vec<String>,
-    changes: &'a mut Vec<Change>,
+    changes: Vec<Change>,
 }
 
 impl Finder<'_> {
@@ -174,6 +192,19 @@ fn others(operator: &BinOp) -> &'static [&'static str] {
     }
 }
 
+/// The text of an operator that compares two values without a side effect.
+fn comparison(operator: &BinOp) -> Option<&'static str> {
+    match operator {
+        BinOp::Lt(_) => Some("<"),
+        BinOp::Le(_) => Some("<="),
+        BinOp::Gt(_) => Some(">"),
+        BinOp::Ge(_) => Some(">="),
+        BinOp::Eq(_) => Some("=="),
+        BinOp::Ne(_) => Some("!="),
+        _ => None,
+    }
+}
+
 fn is_test(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(|attribute| attribute.path().is_ident("test") || attribute.path().is_ident("cfg"))
 }
@@ -227,8 +258,12 @@ impl<'a> Visit<'a> for Finder<'_> {
         let (left, right) = (self.text_of(&expression.left), self.text_of(&expression.right));
         let has_pattern = matches!(*expression.left, Expr::Let(_)) || matches!(*expression.right, Expr::Let(_));
         if !has_pattern {
-            for other in others(&expression.op) {
-                self.add(expression, format!("{left} {other} {right}"), ChangeKind::Expression);
+            for &other in others(&expression.op) {
+                let kind = match comparison(&expression.op) {
+                    Some(was) => ChangeKind::Comparison { left: left.clone(), right: right.clone(), was, will: other },
+                    None => ChangeKind::Expression,
+                };
+                self.add(expression, format!("{left} {other} {right}"), kind);
             }
         }
         visit::visit_expr_binary(self, expression);
@@ -252,5 +287,27 @@ impl<'a> Visit<'a> for Finder<'_> {
             Lit::Bool(value) => self.add(expression, (!value.value).to_string(), ChangeKind::Expression),
             _ => {}
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_comparison_is_evaluated_once_and_reached_where_its_result_differs() {
+        let changes = of_text("core/src/solve/a.rs", "fn is_less(a: f64) -> bool { a < 2.0 }").unwrap();
+        let texts: Vec<String> = changes.iter().map(Change::to_string).collect();
+        let expected = [
+            "core/src/solve/a.rs:1 is_less: returns `true` at once",
+            "core/src/solve/a.rs:1 is_less: returns `false` at once",
+            "core/src/solve/a.rs:1 is_less: `a < 2.0` becomes `a <= 2.0`",
+            "core/src/solve/a.rs:1 is_less: `a < 2.0` becomes `a > 2.0`",
+            "core/src/solve/a.rs:1 is_less: `2.0` becomes `2.0 * 2.0`",
+        ];
+        assert_eq!(texts, expected);
+        let text = "(match (&(a), &(2.0)) { (l, r) => crate::mutant::pick(7, *l < *r, *l <= *r) })";
+        assert_eq!(changes[2].switched(7), text);
+        assert!(changes[0].is_in("core/src/solve") && !changes[0].is_in("core/src/sol"));
     }
 }

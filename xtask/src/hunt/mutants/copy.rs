@@ -1,13 +1,11 @@
 //! A copy of the repository with changes built into it, and its tests.
 
-use super::Crew;
 use super::change::Change;
 use crate::cargo;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::sync::Mutex;
 use std::time::{Duration, Instant};
 use std::{fmt, fs};
 
@@ -24,6 +22,19 @@ static REACHED: LazyLock<Option<(std::ffi::OsString, Vec<AtomicBool>)>> =
 
 /// True if it is this one.
 pub fn on(k: usize) -> bool {
+    reach(k);
+    *ON == k
+}
+
+/// The second value if it is this one, otherwise the first; reached only where they differ.
+pub fn pick(k: usize, was: bool, will: bool) -> bool {
+    if was != will {
+        reach(k);
+    }
+    if *ON == k { will } else { was }
+}
+
+fn reach(k: usize) {
     if let Some((path, reached)) = &*REACHED
         && !reached[k].load(Ordering::Relaxed)
         && !reached[k].swap(true, Ordering::Relaxed)
@@ -31,7 +42,6 @@ pub fn on(k: usize) -> bool {
         let mut file = std::fs::OpenOptions::new().append(true).create(true).open(path).unwrap();
         file.write_all(format!("{k}\n").as_bytes()).unwrap();
     }
-    *ON == k
 }
 "#;
 
@@ -39,19 +49,20 @@ pub fn on(k: usize) -> bool {
 const LIBRARY: &str = "core/src/lib.rs";
 const SWITCHES: &str = "core/src/mutant.rs";
 
-/// The programs of tests: name, arguments of cargo. `lib`, `core`, `case`, `control`, `identify` and `export` are the
-/// tests within the crates of the library, `all` those beside it, `hunt` those of the small hunt, `fmu` those of the
-/// shared object. All take the library without features, so that it is built once; JSON and Parquet are in no area.
-const PROGRAMS: [(&str, &[&str]); 9] = [
-    ("lib", &["--package", "taut", "--lib"]),
-    ("core", &["--package", "taut-core", "--lib"]),
-    ("case", &["--package", "taut-case", "--lib"]),
-    ("control", &["--package", "taut-control", "--lib"]),
-    ("identify", &["--package", "taut-identify", "--lib"]),
-    ("export", &["--package", "taut-export", "--lib"]),
-    ("all", &["--package", "taut", "--test", "all"]),
-    ("hunt", &["--package", "taut-hunt", "--test", "small"]),
-    ("fmu", &["--package", "taut-fmu", "--test", "all"]),
+/// The programs of tests: name, package, folder of the package, target. `lib`, `core`, `case`, `control`, `identify` and
+/// `export` are the tests within the crates of the library, `all` those beside it, `hunt` those of the small hunt, `fmu`
+/// those of the shared object, `cli` those of the program `taut`, which hands the switch on.
+const PROGRAMS: [(&str, &str, &str, &str); 10] = [
+    ("lib", "taut", "", "lib"),
+    ("core", "taut-core", "core", "lib"),
+    ("case", "taut-case", "case", "lib"),
+    ("control", "taut-control", "control", "lib"),
+    ("identify", "taut-identify", "identify", "lib"),
+    ("export", "taut-export", "export", "lib"),
+    ("all", "taut", "", "all"),
+    ("hunt", "taut-hunt", "hunt", "small"),
+    ("fmu", "taut-fmu", "fmu", "all"),
+    ("cli", "taut-cli", "cli", "all"),
 ];
 
 /// Memory that a program of tests may take, KiB: a change may make a loop that collects for ever.
@@ -60,6 +71,8 @@ const MEMORY: u64 = 12 << 20;
 /// The copy.
 pub struct Tree {
     root: PathBuf,
+    /// SHA-256 of the library's source without its tests.
+    pub source: String,
 }
 
 /// A test of a program.
@@ -68,9 +81,12 @@ pub struct Test {
     program: &'static str,
     path: PathBuf,
     name: String,
-    root: PathBuf,
-    /// How long it takes without a change.
-    took: Duration,
+    /// The folder of its package.
+    folder: PathBuf,
+    /// How long it takes without a change, once that is known.
+    pub took: Option<Duration>,
+    /// It was ended without a change after this time.
+    pub longer_than: Duration,
     /// The changes that it reaches.
     pub reached: BTreeSet<usize>,
 }
@@ -80,7 +96,7 @@ pub struct Test {
 pub enum Ended {
     Well,
     Badly,
-    /// It took many times as long as without a change.
+    /// It took several times as long as without a change.
     Not,
 }
 
@@ -112,28 +128,41 @@ impl Tree {
             write(&root.join(name), &bytes)?;
         }
         write(&root.join(SWITCHES), SWITCH.as_bytes())?;
-        Ok(Self { root })
+        let source = crate::data::sum(source(&listed)?.as_bytes());
+        Ok(Self { root, source })
     }
 
-    /// Builds so many changes in, the first that do not overlap and compile.
-    pub fn build(&self, drawn: Vec<Change>, count: usize) -> Result<Vec<Change>, String> {
-        let mut refused: BTreeSet<usize> = BTreeSet::new();
+    /// Builds so many changes of each group in, the first that do not overlap and compile. A file keeps the numbers of
+    /// those that do not.
+    pub fn build(&self, drawn: &[Change], groups: &[Range<usize>], count: usize) -> Result<Vec<Change>, String> {
+        let all: String = drawn.iter().map(|change| change.switched(0)).collect();
+        let hash = crate::data::sum(format!("{}{count}{all}", self.source).as_bytes());
+        let kept = self.root.with_file_name(format!("refused-{}", &hash[..16]));
+        let known = fs::read_to_string(&kept).ok();
+        let numbers = |text: &String| text.split_whitespace().filter_map(|k| k.parse().ok()).collect();
+        let mut refused: BTreeSet<usize> = known.as_ref().map(numbers).unwrap_or_default();
         loop {
             let mut chosen: Vec<usize> = Vec::new();
-            for (k, change) in drawn.iter().enumerate().filter(|(k, _)| !refused.contains(k)) {
-                let apart = |other: &usize| {
-                    let other = &drawn[*other];
-                    other.file != change.file
-                        || other.place.end <= change.place.start
-                        || change.place.end <= other.place.start
-                };
-                if chosen.len() < count && chosen.iter().all(apart) {
-                    chosen.push(k);
+            for group in groups {
+                let end = chosen.len() + count;
+                for k in group.clone().filter(|k| !refused.contains(k)) {
+                    let change = &drawn[k];
+                    let apart = |other: &usize| {
+                        let other = &drawn[*other];
+                        other.file != change.file
+                            || other.place.end <= change.place.start
+                            || change.place.end <= other.place.start
+                    };
+                    if chosen.len() < end && chosen.iter().all(apart) {
+                        chosen.push(k);
+                    }
                 }
             }
-            let places = self.write(&drawn, &chosen)?;
-            let errors = self.errors()?;
+            let places = self.write(drawn, &chosen)?;
+            let errors = if known.is_some() { Vec::new() } else { self.errors()? };
             if errors.is_empty() {
+                let text: Vec<String> = refused.iter().map(usize::to_string).collect();
+                write(&kept, text.join(" ").as_bytes())?;
                 return Ok(chosen.into_iter().map(|k| drawn[k].clone()).collect());
             }
             let before = refused.len();
@@ -209,101 +238,105 @@ impl Tree {
         }
     }
 
-    /// Builds a program of tests; where it is.
-    fn program(&self, arguments: &[&str]) -> Result<PathBuf, String> {
-        let words: Vec<&str> = ["test", "--no-run"].iter().chain(arguments).copied().collect();
-        let output = self.cargo(&words).output().map_err(|error| format!("cargo cannot be started: {error}"))?;
-        let text = String::from_utf8_lossy(&output.stdout);
-        let messages = text.lines().filter_map(|line| serde_json::from_str::<serde_json::Value>(line).ok());
-        let mut built = messages.filter_map(|message| Some(PathBuf::from(message["executable"].as_str()?)));
-        built.next_back().ok_or_else(|| format!("the tests of the copy in {} cannot be built", self.root.display()))
-    }
-
-    /// Builds the programs of these names (none: all), and runs each of their tests without a change, unless that was
-    /// done before with the same program. The quickest tests come first; those that take longer than `longest` are
-    /// left out.
-    pub fn tests(&self, names: &[String], longest: Duration, crew: &Crew) -> Result<Vec<Test>, String> {
-        if let Some(unknown) = names.iter().find(|name| PROGRAMS.iter().all(|(known, _)| known != *name)) {
+    /// Builds the programs of tests and lists the tests of those of these names (none: all).
+    pub fn tests(&self, names: &[String]) -> Result<Vec<Test>, String> {
+        if let Some(unknown) = names.iter().find(|name| PROGRAMS.iter().all(|(known, ..)| known != *name)) {
             return Err(format!(
                 "{unknown} is not a program of tests; allowed: {}",
-                PROGRAMS.map(|(name, _)| name).join(", ")
+                PROGRAMS.map(|(name, ..)| name).join(", ")
             ));
         }
-        let mut tests = Vec::new();
-        for (program, arguments) in PROGRAMS {
-            if names.is_empty() || names.iter().any(|name| name == program) {
-                let path = self.program(arguments)?;
-                let listed = Command::new(&path).args(["--list", "--format", "terse"]).current_dir(&self.root).output();
-                let listed = listed.map_err(|error| format!("{}: {error}", path.display()))?;
-                let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
-                tests.extend(listed.lines().filter_map(|line| line.strip_suffix(": test")).map(|name| Test {
-                    program,
-                    path: path.clone(),
-                    name: name.into(),
-                    root: self.root.clone(),
-                    took: longest,
-                    reached: BTreeSet::new(),
-                }));
+        let is_named = |program: &str| names.is_empty() || names.iter().any(|name| name == program);
+        // All packages are named whatever is built: they share features, so that the library is built once.
+        let mut words = vec!["test", "--no-run"];
+        words.extend(PROGRAMS.iter().flat_map(|(_, package, ..)| ["--package", package]));
+        for (program, .., target) in PROGRAMS {
+            match target {
+                _ if !is_named(program) || words.contains(&target) => {}
+                "lib" if words.contains(&"--lib") => {}
+                "lib" => words.push("--lib"),
+                _ => words.extend(["--test", target]),
             }
         }
-        let begin = Instant::now();
-        let well = Mutex::new(Vec::new());
-        let lists = self.root.with_file_name("reached");
-        fs::create_dir_all(&lists).map_err(|error| format!("{}: {error}", lists.display()))?;
-        crew.each(&tests, |test| {
-            let (ended, tried) = test.reach(&lists, longest);
-            match ended {
-                Ended::Well => well.lock().unwrap().push(tried),
-                Ended::Badly if crew.is_stopped() => {}
-                Ended::Badly => println!("{test} fails without any change, and is left out"),
-                Ended::Not => println!("{test} takes longer than {} s, and is left out", longest.as_secs()),
-            }
-        });
-        let mut tests = well.into_inner().unwrap();
-        tests.sort_by_key(|test| test.took);
-        println!("{} tests, run one by one in {:.0} min", tests.len(), begin.elapsed().as_secs_f64() / 60.0);
+        let output = self.cargo(&words).output().map_err(|error| format!("cargo cannot be started: {error}"))?;
+        let text = String::from_utf8_lossy(&output.stdout);
+        let messages: Vec<serde_json::Value> =
+            text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect();
+        let mut tests = Vec::new();
+        for (program, _, folder, target) in PROGRAMS.into_iter().filter(|(program, ..)| is_named(program)) {
+            let folder = self.root.join(folder);
+            let manifest = folder.join("Cargo.toml");
+            let built = messages.iter().find_map(|message| {
+                let is_it = message["manifest_path"].as_str().is_some_and(|path| Path::new(path) == manifest)
+                    && message["profile"]["test"] == true
+                    && (message["target"]["kind"][0] == "test") == (target != "lib");
+                is_it.then(|| message["executable"].as_str().map(PathBuf::from))?
+            });
+            let path = built
+                .filter(|_| output.status.success())
+                .ok_or_else(|| format!("the tests {program} of the copy in {} cannot be built", self.root.display()))?;
+            let listed = Command::new(&path).args(["--list", "--format", "terse"]).current_dir(&folder).output();
+            let listed = listed.map_err(|error| format!("{}: {error}", path.display()))?;
+            let listed = String::from_utf8_lossy(&listed.stdout).into_owned();
+            tests.extend(listed.lines().filter_map(|line| line.strip_suffix(": test")).map(|name| Test {
+                program,
+                path: path.clone(),
+                name: name.into(),
+                folder: folder.clone(),
+                took: None,
+                longer_than: Duration::ZERO,
+                reached: BTreeSet::new(),
+            }));
+        }
         Ok(tests)
     }
 }
 
 impl Test {
+    /// A test of the program `all`.
+    #[cfg(test)]
+    pub fn named(name: &str) -> Self {
+        Self {
+            program: "all",
+            path: PathBuf::new(),
+            name: name.into(),
+            folder: PathBuf::new(),
+            took: None,
+            longer_than: Duration::ZERO,
+            reached: BTreeSet::new(),
+        }
+    }
+
     /// Runs it with one change turned on.
     pub fn run(&self, k: usize) -> Ended {
-        let mut command = self.command();
+        let took = self.took.unwrap_or_default();
+        let mut command = self.command(3 * took + Duration::from_secs(2));
         command.env("TAUT_MUTANT", k.to_string());
-        wait(&mut command, 10 * self.took + Duration::from_secs(20))
+        wait(&mut command, 10 * took + Duration::from_secs(30))
     }
 
-    /// Runs it without a change; itself with its time and with what it reaches. A file in the folder of lists keeps
-    /// both until the program is built anew.
-    fn reach(&self, lists: &Path, longest: Duration) -> (Ended, Self) {
-        let list = lists.join(self.to_string().replace("::", ".").replace(' ', "-"));
-        let time = list.with_added_extension("time");
-        let modified = |path: &Path| fs::metadata(path).and_then(|file| file.modified()).ok();
-        let of_list = |took| {
-            let text = fs::read_to_string(&list).unwrap_or_default();
-            Self { took, reached: text.lines().filter_map(|line| line.parse().ok()).collect(), ..self.clone() }
-        };
-        let is_new = modified(&time) > modified(&self.path);
-        let before = fs::read_to_string(&time).ok().and_then(|text| text.parse().ok()).map(Duration::from_secs_f64);
-        if let Some(took) = before.filter(|_| is_new) {
-            return (if took <= longest { Ended::Well } else { Ended::Not }, of_list(took));
-        }
-        let _ = fs::remove_file(&list);
+    /// Runs it without a change for at most `longest`, and keeps its time, and what it reaches, in a file.
+    pub fn reach(&mut self, list: &Path, longest: Duration) -> Ended {
+        let _ = fs::remove_file(list);
         let begin = Instant::now();
-        let ended = wait(self.command().env("TAUT_REACHED", &list), longest);
-        let took = begin.elapsed();
-        if ended == Ended::Well {
-            let _ = fs::write(&time, took.as_secs_f64().to_string());
+        let ended = wait(self.command(longest).env("TAUT_REACHED", list), 3 * longest);
+        let text = fs::read_to_string(list).unwrap_or_default();
+        match ended {
+            Ended::Well => self.took = Some(begin.elapsed()),
+            Ended::Badly => {}
+            Ended::Not => self.longer_than = longest,
         }
-        (ended, of_list(took))
+        self.reached = text.lines().filter_map(|line| line.parse().ok()).collect();
+        ended
     }
 
-    fn command(&self) -> Command {
+    /// The command that runs it, which may use this much time of a processor.
+    fn command(&self, longest: Duration) -> Command {
         let mut command = Command::new("sh");
-        let limited = format!("ulimit -v {MEMORY} 2>/dev/null; exec \"$0\" \"$@\"");
+        let seconds = longest.as_secs_f64().ceil();
+        let limited = format!("ulimit -v {MEMORY} 2>/dev/null; ulimit -t {seconds}; exec \"$0\" \"$@\"");
         command.args(["-c", &limited]).arg(&self.path).args(["--exact", &self.name, "--test-threads", "1", "--quiet"]);
-        command.current_dir(&self.root).env("RUST_BACKTRACE", "0").env("CARGO_MANIFEST_DIR", &self.root);
+        command.current_dir(&self.folder).env("RUST_BACKTRACE", "0").env("CARGO_MANIFEST_DIR", &self.folder);
         command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null());
         command
     }
@@ -315,6 +348,7 @@ impl fmt::Display for Test {
     }
 }
 
+/// Waits for a command for at most this long; one that the limit of its processor time killed has not ended.
 fn wait(command: &mut Command, longest: Duration) -> Ended {
     let Ok(mut child) = command.spawn() else { return Ended::Badly };
     let begin = Instant::now();
@@ -322,6 +356,7 @@ fn wait(command: &mut Command, longest: Duration) -> Ended {
     loop {
         match child.try_wait() {
             Ok(Some(status)) if status.success() => return Ended::Well,
+            Ok(Some(status)) if is_used_up(status) => return Ended::Not,
             Ok(Some(_)) | Err(_) => return Ended::Badly,
             Ok(None) if begin.elapsed() > longest => {
                 let _ = child.kill();
@@ -334,6 +369,34 @@ fn wait(command: &mut Command, longest: Duration) -> Ended {
             }
         }
     }
+}
+
+/// True if the system ended a program at its limit of processor time, by SIGXCPU or, beyond it, SIGKILL.
+#[cfg(unix)]
+fn is_used_up(status: std::process::ExitStatus) -> bool {
+    use std::os::unix::process::ExitStatusExt;
+    status.signal().is_some_and(|signal| [signal_hook::consts::SIGXCPU, signal_hook::consts::SIGKILL].contains(&signal))
+}
+
+#[cfg(not(unix))]
+fn is_used_up(_: std::process::ExitStatus) -> bool {
+    false
+}
+
+/// The text of the library without its tests, whose changes leave what a test reaches as it is.
+fn source(listed: &BTreeSet<&str>) -> Result<String, String> {
+    let mut all = String::new();
+    for name in listed.iter().filter(|name| name.ends_with(".rs") && !name.ends_with("/tests.rs")) {
+        if ["", "core/", "case/", "control/", "identify/", "export/"]
+            .iter()
+            .any(|folder| name.strip_prefix(folder).is_some_and(|rest| rest.starts_with("src/")))
+        {
+            let text = fs::read_to_string(name).map_err(|error| format!("{name}: {error}"))?;
+            all.push_str(name);
+            all.push_str(text.split("\n#[cfg(test)]\nmod ").next().unwrap_or_default());
+        }
+    }
+    Ok(all)
 }
 
 /// Writes a file that is not there with these bytes.

@@ -122,3 +122,20 @@ impl Part {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// f = 2 − 7 s + 4 s² + 3 s³ in Bernstein's form: the middle is (f(0) + 3 a + 3 b + f(1))/8.
+    #[test]
+    fn inner_coefficients_are_those_of_the_cubic() {
+        let part = Part { values: [2.0, 2.0], slopes: [-7.0, 10.0], rest: 0.0 };
+        assert_eq!(part.cubic(), [2.0, -7.0, 4.0, 3.0]);
+        let [a, b] = part.inner();
+        assert!((a + 1.0 / 3.0).abs() < 1e-15 && (b + 4.0 / 3.0).abs() < 1e-15, "{a} {b}");
+        assert!((0.125 * (2.0 + 3.0 * a + 3.0 * b + 2.0) - (2.0 - 3.5 + 1.0 + 0.375)).abs() < 1e-15);
+        // Convex at 0 and beyond.
+        assert_eq!(part.bends(), 1.0);
+    }
+}

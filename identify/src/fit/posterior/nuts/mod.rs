@@ -373,6 +373,18 @@ mod tests {
     }
 
     #[test]
+    fn an_observer_sees_the_last_draw() {
+        let seen = AtomicUsize::new(0);
+        let watch = |made: usize| {
+            seen.fetch_max(made, Ordering::Relaxed);
+            true
+        };
+        let effort = Effort { chains: 2, tune: 30, draws: 20, seed: 1 };
+        sample(&standard, &[vec![0.3, 0.1]], effort, &watch).unwrap();
+        assert_eq!(seen.into_inner(), 2 * (30 + 20));
+    }
+
+    #[test]
     fn a_start_without_density_is_refused() {
         let told = sample(&|_, _| None, &[vec![0.0]], Effort::default(), &|_| true).unwrap_err().to_string();
         assert_eq!(told, "the density is zero where a chain would start\n  next: start from a fit that has converged");
