@@ -5,10 +5,12 @@ use crate::common::chance::Chance;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use taut::case::{Case, Move};
+use taut::control::feedback::Feedback;
 use taut::control::recommendation::{self, recommend};
-use taut::control::{Loop, Rows, Setup, Standard, closed_loop, each, stream};
+use taut::control::{Loop, MoveRun, Rows, Setup, Standard, closed_loop, each, stream};
 use taut::fit::{Finding, Fit, Grade, fit};
 use taut::linear::{Analysis, Hold, Operation, Question, Root, StateSpace, System};
+use taut::machine::Travel;
 use taut::measure::measure;
 use taut::mechanism::{Status, What};
 use taut::overview::Overview;
@@ -16,6 +18,8 @@ use taut::reach::pull_out::{PullOut, short_supply};
 use taut::reach::quickest::within_pull_out;
 use taut::solve::{Ending, Flow, Solver, simulate};
 use taut::trajectory::{CsvWriter, Trajectory};
+use taut::tune::trouble::trouble;
+use taut::tune::{Margins, Plant, evaluate, tune};
 
 /// Step of the integration, s.
 const STEP: f64 = 1e-6;
@@ -588,6 +592,70 @@ struct Plotter {
     acceleration: f64,
     points: [[f64; 2]; 2],
     until: f64,
+    /// The loop of each motor, if it has one.
+    corrected: Option<Correction>,
+}
+
+/// A PID that corrects the position of a motor's field by an exact encoder.
+#[derive(Debug, Clone, Copy)]
+struct Correction {
+    every: f64,
+    delay: f64,
+    limit: f64,
+    proportional: f64,
+    integral: f64,
+    derivative: f64,
+    filter: f64,
+    tracking: f64,
+}
+
+/// One of these under way: its integral, filtered slope, and last position; the correction that acts and the next one.
+#[derive(Debug, Clone, Copy, Default)]
+struct Corrected {
+    sum: f64,
+    slope: f64,
+    last: Option<f64>,
+    acts: f64,
+    next: f64,
+}
+
+impl Correction {
+    fn drawn(chance: &mut Chance) -> Self {
+        let mut between = |low: f64, high: f64| low + (high - low) * chance.uniform();
+        let every = between(2e-4, 4e-4);
+        Self {
+            every,
+            delay: every * between(0.1, 0.9),
+            limit: between(2e-5, 2e-4),
+            proportional: between(0.0, 0.08),
+            integral: between(4.0, 15.0),
+            derivative: between(1e-4, 2e-4),
+            filter: between(500.0, 1000.0),
+            tracking: between(0.01, 0.05),
+        }
+    }
+
+    fn table(&self) -> String {
+        let Self { every, delay, limit, proportional, integral, derivative, filter, tracking } = self;
+        format!(
+            "[controller]\nevery = {every:e}\ndelay = {delay:e}\nlimit = {limit:e}\n[controller.pid]\n\
+             proportional = {proportional:e}\nintegral = {integral:e}\nderivative = {derivative:e}\nfilter = {filter:e}\n\
+             tracking = {tracking:e}\n"
+        )
+    }
+
+    /// A sample: reference and measured position, m.
+    fn sample(&self, own: &mut Corrected, reference: f64, measured: f64) {
+        let error = reference - measured;
+        let time = 1.0 / (2.0 * PI * self.filter);
+        let change = error - own.last.unwrap_or(error);
+        own.slope = (own.slope * time + change) / (time + self.every);
+        own.last = Some(error);
+        own.sum += error * self.integral * self.every;
+        let asked = error * self.proportional + own.sum + own.slope * self.derivative;
+        own.next = asked.clamp(-self.limit, self.limit);
+        own.sum += (own.next - asked) * (self.every / self.tracking).min(1.0);
+    }
 }
 
 /// Angles, positions of bridge and cart, the speeds of all, two currents of each motor.
@@ -623,6 +691,7 @@ impl Plotter {
             acceleration: between(1.0, 3.0),
             points: [[between(2e-3, 6e-3), 0.0], [between(2e-3, 6e-3), between(-6e-3, 6e-3)]],
             until: 0.25,
+            corrected: None,
         }
     }
 
@@ -646,7 +715,7 @@ impl Plotter {
             self.speed,
             self.acceleration,
             self.until,
-        )
+        ) + &self.corrected.map_or(String::new(), |own| own.table())
     }
 
     /// Where bridge and cart should be: from rest to rest along each leg, with a trapezoid of speed.
@@ -670,10 +739,16 @@ impl Plotter {
         from
     }
 
-    /// The angles of the fields: motor A moves bridge and cart alike, motor B against each other.
-    fn told(&self, time: f64) -> [f64; 2] {
+    /// References of both belts: motor A moves bridge and cart alike, motor B against each other.
+    fn belts(&self, time: f64) -> [f64; 2] {
         let [x, y] = self.reference(time);
-        [x + y, x - y].map(|belt| self.motor.field(belt / self.radius))
+        [x + y, x - y]
+    }
+
+    /// The angles of the fields, with these corrections of the references.
+    fn told(&self, time: f64, added: [f64; 2]) -> [f64; 2] {
+        let belts = self.belts(time);
+        [0, 1].map(|k| self.motor.field((belts[k] + added[k]) / self.radius))
     }
 
     fn rate(&self, s: &Plane, told: [f64; 2]) -> Plane {
@@ -693,69 +768,99 @@ impl Plotter {
         rate
     }
 
-    /// Positions of bridge and cart every millisecond: classical formula from edge to edge of the microsteps.
-    fn integrate(&self) -> Vec<[f64; 2]> {
+    /// Positions of bridge and cart every millisecond, and the corrections at the end: classical formula from edge to edge
+    /// of the microsteps and the corrections.
+    fn integrate(&self) -> (Vec<[f64; 2]>, [f64; 2]) {
         let mut s = [0.0; 12];
         s[8..].fill(self.motor.rated);
         let (mut time, mut rows) = (0.0, vec![[0.0; 2]]);
+        let mut loops = [Corrected::default(); 2];
+        // The next sample, and whether its correction is on its way.
+        let (mut sample, mut is_late) = (0, false);
         while time < self.until - 1e-9 {
-            let end = (rows.len() as f64 * 1e-3).min(self.until);
+            let mut end = (rows.len() as f64 * 1e-3).min(self.until);
+            let row = end;
+            if let Some(own) = self.corrected {
+                let next =
+                    |sample: i32, is_late: bool| f64::from(sample) * own.every + if is_late { own.delay } else { 0.0 };
+                while next(sample, is_late) <= time + 1e-12 {
+                    for (k, belt) in loops.iter_mut().enumerate() {
+                        match is_late {
+                            true => belt.acts = belt.next,
+                            false => own.sample(belt, self.belts(time)[k], self.radius * s[k]),
+                        }
+                    }
+                    (sample, is_late) = if is_late { (sample + 1, false) } else { (sample, true) };
+                }
+                end = end.min(next(sample, is_late));
+            }
+            let added = loops.map(|own| own.acts);
             let mut h = STEP.min(end - time);
-            let told = self.told(self.motor.heard(time, h));
-            if !self.motor.interpolate && self.told(time + h) != told {
+            let told = self.told(self.motor.heard(time, h), added);
+            if !self.motor.interpolate && self.told(time + h, added) != told {
                 let (mut low, mut high) = (0.0, h);
                 for _ in 0..40 {
                     let middle = 0.5 * (low + high);
-                    if self.told(time + middle) == told { low = middle } else { high = middle }
+                    if self.told(time + middle, added) == told { low = middle } else { high = middle }
                 }
                 h = high;
             }
             s = classical(&s, h, |s| self.rate(s, told));
             time += h;
-            if (time - end).abs() < 1e-10 {
+            if (time - row).abs() < 1e-10 {
                 rows.push([s[2], s[3]]);
             }
         }
-        rows
+        (rows, loops.map(|own| own.acts))
     }
 }
 
+/// Both with and without loops of the motors: the loops correct what the references leave.
 #[test]
 fn drawn_plotters_with_steppers_follow_their_paths_as_their_phases_take_them() {
     for seed in 0..machines().div_ceil(2) {
-        let plotter = Plotter::drawn(&mut Chance::new(5100 + seed));
-        let text = plotter.case();
-        let case = Case::from_text("plotter.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
-        let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
-        let mut controllers = Standard::of_drives(design, &case.machine).unwrap();
-        let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
-        let mut kept = Trajectory::default();
-        let mut sink = |block: &Trajectory| {
-            if kept.is_empty() {
-                kept = Trajectory::with_capacity(&block.columns, 1024);
+        for is_corrected in [false, true] {
+            let chance = &mut Chance::new(5100 + seed);
+            let mut plotter = Plotter::drawn(chance);
+            plotter.corrected = is_corrected.then(|| Correction::drawn(chance));
+            let text = plotter.case();
+            let case = Case::from_text("plotter.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+            let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
+            let mut controllers = Standard::of_drives(design, &case.machine).unwrap();
+            assert_eq!(controllers.len(), if is_corrected { 2 } else { 0 });
+            let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
+            let mut kept = Trajectory::default();
+            let mut sink = |block: &Trajectory| {
+                if kept.is_empty() {
+                    kept = Trajectory::with_capacity(&block.columns, 1024);
+                }
+                kept.append(block);
+                Flow::Continue
+            };
+            let (profiles, timing) = (motion.references(design), Loop::new(design));
+            let solver = Solver::for_machine(&case.machine);
+            let run =
+                stream(&case.machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, false, &mut sink)
+                    .unwrap();
+            assert_eq!(run.outcome.ending, Ending::Complete, "{seed}\n{text}");
+            assert!(run.metrics.in_step(), "{seed}\n{text}");
+            assert_eq!(run.samples.0 > 0, is_corrected);
+            let columns = ["bridge_position", "cart_position"].map(|name| kept.get(name).unwrap());
+            let (others, added) = plotter.integrate();
+            assert_eq!(columns[0].len(), others.len());
+            for (row, other) in others.iter().enumerate() {
+                let off = (0..2).map(|k| (columns[k][row] - other[k]).abs()).fold(0.0, f64::max);
+                // A loop around microsteps amplifies what is off before.
+                let most = if is_corrected { 2e-8 } else { 5e-9 };
+                assert!(off < most, "{seed}: {off:.1e} m apart at {row} ms\n{text}");
             }
-            kept.append(block);
-            Flow::Continue
-        };
-        let (profiles, timing) = (motion.references(design), Loop::new(design));
-        let solver = Solver::for_machine(&case.machine);
-        let run =
-            stream(&case.machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, false, &mut sink)
-                .unwrap();
-        assert_eq!(run.outcome.ending, Ending::Complete, "{seed}\n{text}");
-        assert!(run.metrics.in_step(), "{seed}\n{text}");
-        let columns = ["bridge_position", "cart_position"].map(|name| kept.get(name).unwrap());
-        let others = plotter.integrate();
-        assert_eq!(columns[0].len(), others.len());
-        for (row, other) in others.iter().enumerate() {
-            let off = (0..2).map(|k| (columns[k][row] - other[k]).abs()).fold(0.0, f64::max);
-            assert!(off < 5e-9, "{seed}: {off:.1e} m apart at {row} ms\n{text}");
-        }
-        // Commanded minus reached.
-        let (told, end) = (plotter.told(plotter.until), others.last().unwrap());
-        let asked = [told[0] + told[1], told[0] - told[1]].map(|sum| 0.5 * plotter.radius * sum);
-        for (k, load) in run.metrics.loads.iter().enumerate() {
-            assert!((load.command_error.unwrap() - (asked[k] - end[k])).abs() < 5e-9, "{seed}\n{text}");
+            // Commanded minus reached; what is commanded has the corrections in it.
+            let (told, end) = (plotter.told(plotter.until, added), others.last().unwrap());
+            let asked = [told[0] + told[1], told[0] - told[1]].map(|sum| 0.5 * plotter.radius * sum);
+            for (k, load) in run.metrics.loads.iter().enumerate() {
+                let left = load.command_error.unwrap() - (asked[k] - end[k]);
+                assert!(is_corrected || left.abs() < 5e-9, "{seed}: {left:e} m\n{text}");
+            }
         }
     }
 }
@@ -794,10 +899,114 @@ fn a_move_beyond_the_pull_out_torque_is_told_and_a_planned_one_loses_no_step() {
     assert!(left.abs() > 1e-3 && (tracked - left).abs() < 1e-4, "{tracked} m, {left} m");
     assert!(planned.metrics.in_step() && planned.metrics.cart().command_error.unwrap().abs() < 5e-5);
     // The quickest one that takes six tenths of the torque everywhere is not slow.
-    let most = PullOut::new(&case.machine).unwrap().largest_acceleration(&case.machine, 0.1);
+    let mut limited = case.machine.clone();
+    limited.cart.travel = Some(Travel { min: 0.0, max: 0.1, stop: None });
+    let most = within_pull_out(&limited, 0, 0.0).unwrap();
     let bound = 2.0 * (0.1 / most).sqrt();
     let end = case.moves[1].end();
     assert!(bound < end && end < 2.2 * bound, "{end} s, {bound} s at the pull-out torque");
+}
+
+/// An axis whose field a PID corrects every half millisecond, with dry friction of the cart, and one move of 20 mm.
+fn corrected(gains: &str, coulomb: f64, (speed, acceleration): (f64, f64), changes: &[&str]) -> Case {
+    let text =
+        plain(0.45, 6.4e-3, 16, &format!("[cart]\nmass = 0.4\nfriction = {{ viscous = 3, coulomb = {coulomb} }}\n"))
+            + &format!(
+                "[controller]\nevery = 5e-4\n{gains}\n[[move]]\nname = \"there\"\nto = 20e-3\nspeed = {speed}\n\
+             acceleration = {acceleration}\nwindow = 20e-6\nuntil = 1.5\n"
+            );
+    Case::from_text_with("corrected.toml", &text, changes).unwrap_or_else(|error| panic!("{error}\n{text}"))
+}
+
+fn moved(case: &Case) -> MoveRun {
+    let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
+    closed_loop(&Setup {
+        machine: &case.machine,
+        model: &case.machine,
+        design,
+        profiles: &motion.profiles,
+        until: motion.until,
+        window: motion.window,
+        solver: Solver::for_machine(&case.machine),
+    })
+    .unwrap()
+}
+
+/// The loop of an encoder around a field: its integral removes what friction leaves of the way, and without gains it is
+/// none.
+#[test]
+fn an_encoder_removes_the_lag_that_friction_leaves() {
+    let of = |gains: &str| moved(&corrected(gains, 4.0, (0.1, 1.0), &["stepper.interpolate=true"]));
+    let open = of("");
+    let [none, closed] = ["pid = { proportional = 0 }", "pid = { proportional = 0.1, integral = 40 }"].map(of);
+    let (without, with) = (open.figures.cart(), none.figures.cart());
+    assert_eq!((open.samples.0, none.samples.0), (0, 3001));
+    assert!((without.error.rms - with.error.rms).abs() < 2e-9, "{without:?}, {with:?}");
+    // The motor's own encoder does not see the stretch: it is the rotor that arrives.
+    let [left, corrected] = [&open, &closed].map(|run| run.figures.drives[0].following.last.abs());
+    assert!(left > 1e-6 && corrected < 0.1 * left, "{left} m, {corrected} m");
+}
+
+/// With integral action alone: the gain at which the margins of the loop end is that at which its moves grow.
+#[test]
+fn the_loop_of_a_stepper_is_stable_where_its_margins_say_so() {
+    let of = |integral: f64| {
+        let gains = format!("pid = {{ proportional = 0, integral = {integral:e} }}");
+        corrected(&gains, 0.0, (0.1, 0.5), &["stepper.interpolate=true", "cart.friction.viscous=1"])
+    };
+    let margins = |integral: f64| {
+        let case = of(integral);
+        let design = case.controller.as_ref().unwrap();
+        let feedback = Feedback::new(design, &case.machine).unwrap();
+        let plant = Plant::new(&case.machine, Operation::default(), design, &feedback.corners()).unwrap();
+        Margins::new(&plant, &feedback)
+    };
+    let [mut low, mut high] = [1.0, 1e4];
+    assert!(margins(low).stable && !margins(high).stable);
+    while high / low > 1.001 {
+        let middle = (low * high).sqrt();
+        *if margins(middle).stable { &mut low } else { &mut high } = middle;
+    }
+    for (factor, grows) in [(0.9, false), (1.1, true)] {
+        let run = moved(&of(factor * low));
+        let swing = run.swings[0];
+        assert!(run.metrics.in_step() && (swing.late > swing.early) == grows, "{factor}: {swing:?}");
+        let hertz = margins(low).at / (2.0 * PI);
+        assert!(!grows || (swing.frequency / hertz - 1.0).abs() < 0.05, "{hertz} Hz: {swing:?}");
+    }
+}
+
+/// A move that is too quick loses steps; the field then goes on until the encoder is where it should be.
+#[test]
+fn an_encoder_brings_a_rotor_back_that_lost_steps() {
+    let of = |gains: &str| {
+        let case = corrected(gains, 1.0, (1.2, 70.0), &["stepper.interpolate=true"]);
+        let run = moved(&case);
+        let told = trouble(&case.machine, case.controller.as_ref().unwrap(), &run, &case.moves[0]);
+        (run, told)
+    };
+    let [(open, lost), (closed, none)] = ["", "pid = { proportional = 0, integral = 8 }"].map(of);
+    assert!(!open.metrics.in_step() && open.figures.cart().error.last.abs() > 5e-4 && lost.is_some());
+    assert!(!closed.metrics.in_step() && closed.figures.settling.is_some() && none.is_none(), "{none:?}");
+}
+
+/// `taut tune` refused steppers.
+#[test]
+fn the_gains_of_a_stepper_with_an_encoder_are_tuned() {
+    let gains = "pid = { proportional = 0.05, integral = 5, derivative = 1e-4, filter = 800 }";
+    let case = corrected(gains, 2.0, (0.2, 2.0), &[]);
+    let tuning = taut::case::Tuning { spread: Some(0.1), effort: 0.1, ..Default::default() };
+    let before = evaluate(&case, &tuning).unwrap();
+    assert!(before.after.nominal.stable && before.holds);
+    let tuned = tune(&case, &tuning, &|| false).unwrap();
+    let [was, is] = [&tuned.before, &tuned.after].map(|verdict| verdict.objective);
+    assert!(tuned.holds && is < was, "{is}, before {was}");
+    assert!(tuned.after.worst.sensitivity <= 1.8 && tuned.after.worst.complementary <= 1.8);
+    let text = tuned.case_text(&case, std::path::Path::new("tuned.toml")).unwrap();
+    assert!(text.contains(" 1/s\""), "{text}");
+    let open = corrected("", 2.0, (0.2, 2.0), &[]);
+    let error = tune(&open, &tuning, &|| false).unwrap_err().to_string();
+    assert!(error.contains("open loop") && error.contains("taut plan") && error.contains("pid = {"), "{error}");
 }
 
 /// An axis with full steps, and its log: the cart on a scale, in micrometres.
@@ -918,7 +1127,7 @@ fn suggested_accelerations_keep_the_reserve_of_a_plan_to_the_pull_out_torque() {
     );
     let text = plain(0.45, radius, 16, &rest);
     let case = Case::from_text("shaped.toml", &text).unwrap();
-    let most = within_pull_out(&case.machine, 0).unwrap();
+    let most = within_pull_out(&case.machine, 0, 0.1).unwrap();
     // Acceleration over half of the travel: T(v/r) (1 − 10 %) ≥ r (M a + b v + F_c), and somewhere nearly as much.
     let mass = 0.4 + (5.4e-6 + 2e-6) / (radius * radius);
     let motor = PullOut::new(&case.machine).unwrap();

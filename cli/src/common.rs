@@ -35,11 +35,6 @@ impl Common {
         self.whole(path, Accepted::All)
     }
 
-    /// Opens the case of a machine whose motors are commanded by voltage or current, with the files of its experiments.
-    pub fn open_motors_for(&self, path: &Path, files: Files) -> Result<Case> {
-        self.accepting(path, (files, Accepted::Motors))
-    }
-
     /// Opens the case of a machine whose motors are commanded by voltage or current, with all its files.
     pub fn open_motors(&self, path: &Path) -> Result<Case> {
         self.whole(path, Accepted::Motors)

@@ -30,7 +30,7 @@ const WITH_LOGS: [&str; 2] = ["stages/h-frame/belts.toml", "stages/core-xy/belts
 const STEPPERS: [&str; 2] = ["stages/stepper-axis/stepper-axis.toml", "stages/printer-core-xy/printer.toml"];
 
 /// Commands that take a stepper; all others refuse it.
-const WITH_STEPPER: [&str; 12] = [
+const WITH_STEPPER: [&str; 15] = [
     "show",
     "simulate",
     "modes",
@@ -43,7 +43,13 @@ const WITH_STEPPER: [&str; 12] = [
     "export c",
     "export json",
     "export fmu",
+    "export matlab",
+    "export python",
+    "learn",
 ];
+
+/// A stepper without feedback, where a controller is needed.
+const OPEN_LOOP: Ends = Refused("a stepper in open loop");
 
 /// Of whatever does not.
 const NO_MOTOR: Ends = Refused("this needs a motor that is commanded by voltage or current");
@@ -99,7 +105,7 @@ const CALM: &str =
 /// The log of a repeated move of a case, in this folder.
 fn trial(case: &str, options: &[&str], folder: &Path) -> String {
     let out = folder.join("trial").display().to_string();
-    let name = if options.contains(&"square") { "square" } else { "short fast" };
+    let name = options.iter().skip_while(|option| **option != "--move").nth(1).unwrap();
     let changes =
         options.iter().filter(|option| option.contains("controller.pid")).flat_map(|option| ["--set", option]);
     let _ = taut_in(root())
@@ -173,7 +179,7 @@ fn every_kind_goes_through_every_command() {
                     "there/" => there.as_str(),
                     "short fast" if case == STEPPERS[0] => "there and back",
                     "short fast" if case != *axis => "square",
-                    "title=calm" if case != *axis => CALM,
+                    "title=calm" if case != *axis && !STEPPERS.contains(&case) => CALM,
                     "motor_current=10mA" if GANTRIES.contains(&case) => "left_current=10mA",
                     option => option,
                 })
@@ -216,6 +222,7 @@ fn every_kind_goes_through_every_command() {
             "studio" => {}
             // Its case needs a log.
             "fit" => {}
+            "tune" | "export st" => STEPPERS.iter().for_each(|case| run(case, &OPEN_LOOP)),
             taken if WITH_STEPPER.contains(&taken) => STEPPERS.iter().for_each(|case| run(case, &Runs)),
             _ => STEPPERS.iter().for_each(|case| run(case, &NO_MOTOR)),
         }

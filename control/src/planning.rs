@@ -169,20 +169,24 @@ impl Plans {
     }
 }
 
-/// The machine with drivers that interpolate: the edges of microsteps take most of the time of a run.
-fn smooth(machine: &Machine) -> Machine {
-    let mut smooth = machine.clone();
-    for unit in &mut smooth.drives {
-        unit.motor.stepper.iter_mut().for_each(|stepper| stepper.interpolate = true);
-    }
-    smooth
-}
-
 /// The machine with spans that can also push, which shows by how much a slack span lacks tension.
 fn two_sided(machine: &Machine) -> Machine {
     let mut machine = machine.clone();
     machine.belt.pretension = None;
     machine
+}
+
+/// Tolerance of the runs of a search on machines with steppers, as a part of the window.
+const ROUGHLY: f64 = 1e-2;
+
+/// Solver of the runs of a search: steppers need the general one, whose steps grow with its tolerance.
+fn roughly(machine: &Machine, motion: &Move) -> Solver {
+    match Solver::for_machine(machine) {
+        Solver::General { tolerance } if machine.stepper().is_some() => {
+            Solver::General { tolerance: (ROUGHLY * motion.window).clamp(tolerance, 1e-6) }
+        }
+        solver => solver,
+    }
 }
 
 /// Results of a run.
@@ -240,10 +244,10 @@ impl Planner<'_> {
         // A stepper's microsteps shake the belt more than the search has shown.
         if !self.beyond(&profiles, &ran).is_empty() && !(self.stop)() {
             (best.limits, _) = self
-                .slowed(&search, best.periods, best.share, best.limits, machine)?
+                .slowed(&search, best.periods, best.share, best.limits, (machine, Solver::for_machine(machine)))?
                 .map_err(|short| impossible(short.words))?;
             profiles = search.way.within(&best.limits)?;
-            let (arrival, slowest) = self.of_family(motion, &profiles, &best.arrival)?;
+            let (arrival, slowest) = self.of_family(motion, &profiles, &best.arrival, (f64::INFINITY, &mut 0))?;
             (best.arrival, ran) = self.finished(
                 motion,
                 &profiles,
@@ -252,7 +256,7 @@ impl Planner<'_> {
             )?;
         }
         let given = self.arrival(motion, &motion.profiles)?;
-        let (given, slowest) = self.of_family(motion, &motion.profiles, &given)?;
+        let (given, slowest) = self.of_family(motion, &motion.profiles, &given, (f64::INFINITY, &mut 0))?;
         let (given, ran_given) = self.finished(motion, &motion.profiles, given, slowest)?;
         short.extend(self.beyond(&motion.profiles, &ran_given));
         short.extend(self.wanted.exceeded_by(&motion.profiles));
@@ -297,7 +301,8 @@ impl Planner<'_> {
     /// exceeded for which there is none.
     fn tried(&self, search: &Search) -> Result<(Vec<Tried>, Option<Shortfall>)> {
         let (mut tried, mut refused) = (Vec::new(), None);
-        let machine = smooth(&self.family.machine);
+        let machine = self.family.machine.interpolating();
+        let solver = roughly(&machine, search.motion);
         for periods in PERIODS {
             let mut seen: Vec<Limits> = Vec::new();
             for share in SHARES {
@@ -311,7 +316,7 @@ impl Planner<'_> {
                     continue;
                 }
                 seen.push(limits);
-                match self.slowed(search, periods, share, limits, &machine)? {
+                match self.slowed(search, periods, share, limits, (&machine, solver))? {
                     Ok((limits, ran)) => {
                         let duration = Profile::last_end(&search.way.within(&limits)?);
                         tried.push(Tried { limits, periods, share, arrival: Arrival::new(duration, &ran) });
@@ -336,14 +341,14 @@ impl Planner<'_> {
         periods: [u8; 2],
         motor: f64,
         mut limits: Limits,
-        machine: &Machine,
+        (machine, solver): (&Machine, Solver),
     ) -> Result<std::result::Result<(Limits, Ran), Shortfall>> {
         let of_belt =
             |loads: &[Load]| loads.iter().filter(|load| !load.is_of_motor()).map(Load::share).fold(0.0, f64::max);
         let (mut belt, mut slowed) = (1.0, 0);
         loop {
             let profiles = search.way.within(&limits)?;
-            let ran = self.run(search.motion, &profiles, machine)?;
+            let ran = self.run(search.motion, &profiles, (machine, solver))?;
             let Some(short) = self.beyond(&profiles, &ran).into_iter().next() else { return Ok(Ok((limits, ran))) };
             if slowed == SLOWED {
                 return Ok(Err(short));
@@ -351,7 +356,7 @@ impl Planner<'_> {
             slowed += 1;
             let shaped = self.design.shaped(&profiles);
             let required = of_belt(&loads(&self.family.machine, self.design.bounds(), &shaped));
-            let taken = self.run(search.motion, &profiles, &two_sided(machine))?;
+            let taken = self.run(search.motion, &profiles, (&two_sided(machine), solver))?;
             belt = AIMED * required.min(belt) / of_belt(&loads_of_run(&self.family.machine, &taken.spans)).max(1.0);
             limits = match self.limits(search, periods, Share { motor, belt })? {
                 Some(limits) => limits,
@@ -372,16 +377,32 @@ impl Planner<'_> {
     fn best(&self, search: &Search, tried: &mut [Tried]) -> Result<(Tried, Option<&Machine>)> {
         tried.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
         let (mut best, mut slowest, mut is_run) = (tried[0].clone(), None, false);
-        for one in tried {
-            // The slowest machine of a family does not arrive before any of its members.
-            if (self.stop)() || is_run && best.rank() <= one.rank() {
+        // Runs of steppers take long: those of a plan end at a machine that arrives too late, unless all plans have one.
+        let is_slow = self.family.machine.stepper().is_some();
+        let mut first = 0;
+        for is_cut in [is_slow, false] {
+            for one in &mut *tried {
+                // The slowest machine of a family does not arrive before any of its members.
+                if (self.stop)() || is_run && best.rank() <= one.rank() {
+                    break;
+                }
+                let bar = match is_cut {
+                    true if is_run => best.rank().min(NEVER),
+                    true => NEVER,
+                    false => f64::INFINITY,
+                };
+                let profiles = search.way.within(&one.limits)?;
+                let late;
+                (one.arrival, late) = self.of_family(search.motion, &profiles, &one.arrival, (bar, &mut first))?;
+                if !is_run || one.rank() < best.rank() {
+                    (best, slowest, is_run) = (one.clone(), late, true);
+                }
+            }
+            if !is_cut || best.rank() < NEVER || (self.stop)() {
                 break;
             }
-            let late;
-            (one.arrival, late) = self.of_family(search.motion, &search.way.within(&one.limits)?, &one.arrival)?;
-            if !is_run || one.rank() < best.rank() {
-                (best, slowest, is_run) = (one.clone(), late, true);
-            }
+            is_run = false;
+            tried.iter_mut().for_each(|one| one.arrival = one.arrival.alone());
         }
         Ok((best, slowest))
     }
@@ -396,7 +417,7 @@ impl Planner<'_> {
     }
 
     /// A run in closed loop, or as steppers take the cart along the references.
-    fn run(&self, motion: &Move, profiles: &[Profile], machine: &Machine) -> Result<Ran> {
+    fn run(&self, motion: &Move, profiles: &[Profile], (machine, solver): (&Machine, Solver)) -> Result<Ran> {
         let watched = (motion.until - motion.end()).max(WATCHED);
         let run = closed_loop(&Setup {
             machine,
@@ -405,7 +426,7 @@ impl Planner<'_> {
             profiles,
             until: Profile::last_rest(&self.design.shaped(profiles)) + watched,
             window: motion.window,
-            solver: Solver::for_machine(machine),
+            solver,
         })?;
         let settling = run.figures.settling.filter(|_| run.outcome.ending == Ending::Complete);
         Ok(Ran {
@@ -417,24 +438,40 @@ impl Planner<'_> {
 
     /// Arrival on the machine of the file alone.
     fn arrival(&self, motion: &Move, profiles: &[Profile]) -> Result<Arrival> {
-        let ran = self.run(motion, profiles, &smooth(&self.family.machine))?;
+        let machine = self.family.machine.interpolating();
+        let ran = self.run(motion, profiles, (&machine, roughly(&machine, motion)))?;
         Ok(Arrival::new(Profile::last_end(profiles), &ran))
     }
 
-    /// The same with the whole family, and the machine that arrives last.
-    fn of_family(&self, motion: &Move, profiles: &[Profile], own: &Arrival) -> Result<(Arrival, Option<&Machine>)> {
+    /// The same with the whole family, and the machine that arrives last; only up to a machine that arrives later than
+    /// the bar, s, which is then the first one of the next family.
+    fn of_family(
+        &self,
+        motion: &Move,
+        profiles: &[Profile],
+        own: &Arrival,
+        (bar, first): (f64, &mut usize),
+    ) -> Result<(Arrival, Option<&Machine>)> {
         let mut arrival = Arrival { settled: 0, axes: 0, ..own.clone() };
         let mut slowest: Option<(f64, &Machine)> = None;
-        for (machine, count) in &self.machines {
+        let begin = *first;
+        let others = (0..self.machines.len()).filter(|number| *number != begin);
+        for number in std::iter::once(begin).chain(others) {
             if (self.stop)() {
                 return Ok((arrival, None));
             }
-            let time = self.run(motion, profiles, &smooth(machine))?.arrives;
+            let (machine, count) = &self.machines[number];
+            let smooth = machine.interpolating();
+            let time = self.run(motion, profiles, (&smooth, roughly(machine, motion)))?.arrives;
             arrival.settled += if time.is_some() { *count } else { 0 };
             arrival.axes += count;
             let late = time.unwrap_or(f64::INFINITY);
             if slowest.is_none_or(|(latest, _)| late > latest) {
                 slowest = Some((late, machine));
+            }
+            if late > bar {
+                *first = number;
+                break;
             }
         }
         arrival.worst = slowest.map(|(latest, _)| latest).filter(|latest| latest.is_finite());
@@ -449,12 +486,13 @@ impl Planner<'_> {
         mut arrival: Arrival,
         slowest: Option<&Machine>,
     ) -> Result<(Arrival, Ran)> {
-        let ran = self.run(motion, profiles, &self.family.machine)?;
+        let closely = |machine| (machine, Solver::for_machine(machine));
+        let ran = self.run(motion, profiles, closely(&self.family.machine))?;
         (arrival.nominal, arrival.cart_error) = (ran.arrives, ran.error);
         if let (true, Some(worst), Some(machine)) =
             (self.family.machine.mechanism().is_stepped(), arrival.worst, slowest)
         {
-            arrival.worst = self.run(motion, profiles, machine)?.arrives.map(|stepped| worst.max(stepped));
+            arrival.worst = self.run(motion, profiles, closely(machine))?.arrives.map(|stepped| worst.max(stepped));
         }
         Ok((arrival, ran))
     }
@@ -483,6 +521,11 @@ impl Planner<'_> {
 }
 
 impl Arrival {
+    /// On the nominal machine alone.
+    fn alone(&self) -> Self {
+        Self { worst: None, settled: usize::from(self.nominal.is_some()), axes: 1, ..self.clone() }
+    }
+
     /// That of a run on the machine of the file alone.
     fn new(duration: f64, ran: &Ran) -> Self {
         Self {

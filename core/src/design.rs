@@ -1,7 +1,8 @@
 //! A controller as data: its timing, its structure with its gains, and the parts around it.
 //!
-//! A command is in units of the amplifier's input (V in voltage mode, A in current mode), a position in m along the
-//! belt: r φ from an encoder at motor or pulley, x from one at the cart. The crate `taut-control` steps it in time.
+//! A command is in units of the amplifier's input (V in voltage mode, A in current mode; of a stepper, m that are added
+//! to its reference), a position in m along the belt: r φ from an encoder at motor or pulley, x from one at the cart. The
+//! crate `taut-control` steps it in time.
 
 pub mod placement;
 mod tunable;
@@ -59,6 +60,11 @@ impl Design {
     /// interval between rows, s.
     pub fn open_loop(every: f64, shaper: Vec<[f64; 2]>) -> Self {
         Self { shaper, ..Self::new(every, Structure::OpenLoop(OpenLoop)) }
+    }
+
+    /// True for steppers without feedback.
+    pub fn is_open_loop(&self) -> bool {
+        matches!(self.structure, Structure::OpenLoop(_))
     }
 
     /// The limits that it sets itself.
@@ -121,7 +127,7 @@ structures! {
     SlidingMode,
     /// A table of rules.
     Fuzzy,
-    /// The reference itself, as a stepper's command.
+    /// None: a stepper follows its reference.
     OpenLoop,
 }
 
@@ -245,7 +251,7 @@ pub struct Fuzzy {
     pub filter: f64,
 }
 
-/// No feedback: the command is the reference.
+/// No feedback: a stepper's command is its reference.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OpenLoop;
 

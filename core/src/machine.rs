@@ -106,6 +106,15 @@ impl Machine {
         self.drives.iter().find_map(|unit| unit.motor.stepper.as_ref())
     }
 
+    /// This machine with drivers that interpolate between microsteps, whose edges take most of the time of a run.
+    pub fn interpolating(&self) -> Self {
+        let mut other = self.clone();
+        for unit in &mut other.drives {
+            unit.motor.stepper.iter_mut().for_each(|stepper| stepper.interpolate = true);
+        }
+        other
+    }
+
     /// Drives that turn when the slide of this number moves alone, each with its direction.
     pub fn movers(&self, number: usize) -> impl Iterator<Item = (usize, f64)> {
         let shares = self.belt_shares().into_iter().enumerate();

@@ -150,8 +150,8 @@ pub(crate) fn identifier(name: &str) -> String {
 /// caller's to say.
 pub fn controller(case: &Case) -> Result<(&Case, &crate::design::Design)> {
     match &case.controller {
-        Some(_) if case.machine.stepper().is_some() => {
-            Err(Error::new("a stepper follows its command without a controller"))
+        Some(design) if design.is_open_loop() => {
+            Err(Error::new("a stepper in open loop follows its command without a controller"))
         }
         Some(design) => Ok((case, design)),
         None => Err(Error::new("this case has no controller")),
@@ -161,7 +161,9 @@ pub fn controller(case: &Case) -> Result<(&Case, &crate::design::Design)> {
 /// The next step where a controller is missing: to add one, where the case can have one, or `instead`.
 fn without_controller(case: &Case, error: Error, instead: &str) -> Error {
     error.next(match case.is_axis() {
-        _ if case.machine.stepper().is_some() => instead.to_string(),
+        _ if case.machine.stepper().is_some() => {
+            format!("add pid to [controller], as in docs/stepper.md, or {instead}")
+        }
         true => format!("add a [controller], as in docs/control.md, or {instead}"),
         false => instead.to_string(),
     })
@@ -218,9 +220,6 @@ fn shaper_remark(design: &crate::design::Design) -> Vec<String> {
 /// # Ok::<(), taut::Error>(())
 /// ```
 pub fn export(case: &Case, target: Target, stem: &str, options: &Options) -> Result<Exported> {
-    if target != Target::C {
-        crate::case::needs_motors(&case.machine)?;
-    }
     let has_plant = match target {
         Target::C => part(case, options.part)?.has_plant(),
         Target::StructuredText => false,

@@ -1,6 +1,6 @@
 //! The tables of a machine packed into lists of numbers: each row of weights once, and where each table finds its own.
 
-use super::tables::{ElementKind, Row, Tables, Then};
+use super::tables::{ElementKind, Row, Stepped, Tables, Then};
 use std::collections::HashMap;
 
 /// The code that follows a condition which ends the run.
@@ -31,6 +31,12 @@ pub(super) struct Packed {
     pub bodies: Vec<[i64; 3]>,
     /// Lengths in the places of angles: (body, other body or −1 for its own, arm).
     pub lengths: Vec<[f64; 3]>,
+    /// Places of the factors of each product.
+    pub products: Vec<[i64; 2]>,
+    /// Steppers by drives: the body that the rotor turns, the place of its sine, electrical angle and angle per input
+    /// (rad/m), input of a microstep (m, 0 for none), farthest jump of the input (m), amplitude of what the driver
+    /// commands of a phase (A or V), amplitude and limit of the current at rest (A).
+    pub steppers: Vec<[f64; 9]>,
     /// Numbers of the first table of the currents, the voltages and the forces.
     pub outputs: [i64; 3],
     /// Number of the first table that was asked for.
@@ -97,8 +103,20 @@ impl Packed {
         self.entry_first.len() as i64 - 1
     }
 
-    /// Elements and bodies.
+    /// Elements, bodies, products and steppers.
     fn parts(&mut self, tables: &Tables) {
+        self.products = tables.products.iter().map(|factors| factors.map(|place| place as i64)).collect();
+        let stepper = |own: &Stepped| {
+            let [per_input, most] = [own.per_input, own.phases.supply / own.phases.resistance];
+            let electrical = own.phases.teeth * per_input;
+            let [field, holding] = [own.phases.commanded(), own.phases.holding_current()];
+            let (shaft, sine) = (own.shaft as f64, own.sine as f64);
+            let microstep = own.microstep.unwrap_or(0.0);
+            // With what rounding may add.
+            let farthest = own.farthest * (1.0 + 1e-6);
+            [shaft, sine, electrical, per_input, microstep, farthest, field, holding, most]
+        };
+        self.steppers = tables.steppers.iter().map(stepper).collect();
         let (mechanism, layout) = (&tables.mechanism, &tables.layout);
         let states = tables.elements.iter().map(|element| element.states.len() as i64);
         self.elements = states.zip(tables.at_rest()).map(|(states, at_rest)| [states, at_rest as i64]).collect();

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use taut_control::control::Stepped;
 use taut_core::mechanism::{DRIVES, Mechanism};
-use taut_core::signal::{DEGREE, Piece};
+use taut_core::signal::{DEGREE, Piece, shifted};
 use taut_core::solve::{Dynamics, Simulator, Solver};
 use taut_export::fmu::{Model, REFERENCES, Role};
 
@@ -351,8 +351,18 @@ impl Instance {
                 pieces[drive] = Piece { start: since - self.begin, end: f64::INFINITY, coefficients };
             }
         }
-        for (piece, command) in pieces.iter_mut().zip(self.control.iter().flat_map(Stepped::commands)) {
+        let commands = self.control.iter().flat_map(Stepped::commands);
+        for ((piece, command), shares) in pieces.iter_mut().zip(commands).zip(self.model.machine().belt_shares()) {
             *piece = held(*command);
+            if self.model.machine().stepper().is_none() {
+                continue;
+            }
+            // The command of a stepper corrects the reference of its part of the belt.
+            for (slide, share) in shares.iter().enumerate() {
+                let Input { since, coefficients } = self.inputs[REFERENCES * slide];
+                let now = shifted(&coefficients, self.time - since);
+                piece.coefficients.iter_mut().zip(now).for_each(|(sum, own)| *sum += share * own);
+            }
         }
         pieces
     }

@@ -60,11 +60,13 @@ pub(super) fn shortfall(short: &Shortfall) -> Value {
 
 fn of_drive(drive: &DriveFigures, lost: Option<LostSteps>) -> Map<String, Value> {
     let value = match lost {
-        // A stepper has no samples, and its phases have voltages of their own.
+        // The phases of a stepper have voltages of their own; in open loop it has no samples.
         Some(lost) => json!({
             "lost_steps": lost.at_end,
             "slips": lost.slips,
             "first_slip_s": lost.first_slip,
+            "limited_s": drive.limited,
+            "command_turns_per_s": drive.restlessness,
         }),
         None => json!({
             "peak_voltage_V": peak(drive.voltage.0),
@@ -121,7 +123,7 @@ pub fn motion(done: &Moved) -> Value {
         "limited_samples": run.samples.1,
         "events": run.outcome.events.len(),
         "position_error_m": run.outcome.error.map(|error| error.value),
-        "position_error_basis": run.outcome.error.map(|_| Accuracy::basis(done.machine)),
+        "position_error_basis": run.outcome.error.map(|_| Accuracy::basis(done.machine, run)),
         "is_determined": is_determined(&run.outcome),
         "decided_within_rounding": TieTold::from_outcome(&run.outcome),
         "trouble": done.trouble.map(|trouble| json!({

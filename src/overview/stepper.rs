@@ -1,9 +1,11 @@
 //! Overview of a stepper: its constants, the torque that its field loses it at, and the largest acceleration.
 
 use super::{Group, Note};
+use crate::machine::rigid::Rigid;
 use crate::machine::{Amplifier, AmplifierMode, Machine, Motor};
 use crate::number::engineering;
 use crate::reach::pull_out::{PullOut, short_supply};
+use crate::reach::quickest::within_pull_out;
 use std::f64::consts::PI;
 
 /// Speeds at the belt that pull-out torques are given at, m/s.
@@ -33,8 +35,7 @@ pub(super) fn drive(machine: &Machine) -> Group {
     group.add("travel_per_microstep", "travel per microstep", stepper.microstep() * r, "m");
     let stiffness = stepper.teeth() * (torque - 4.0 * stepper.detent_torque) / (r * r);
     group.add("field_stiffness", "stiffness of the field at the belt", stiffness, "N/m").how("N (T_h − 4 T_d)/r²");
-    let mass = PullOut::new(machine).map_or(f64::NAN, |pull_out| pull_out.mass());
-    let hertz = (stiffness / mass).sqrt() / (2.0 * PI);
+    let hertz = (stiffness / Rigid::new(machine).mass).sqrt() / (2.0 * PI);
     group.add("field_resonance", "resonance of all on the field", hertz, "Hz").how("as one mass");
     group
 }
@@ -53,9 +54,10 @@ pub(super) fn limits(machine: &Machine) -> Option<Group> {
         let row = group.add(format!("pull_out_torque{number}"), name, pull_out.torque(speed / r), "N m");
         row.how(format!("{:.0} full steps/s", pull_out.steps_per_second(speed / r)));
     }
-    if let Some(travel) = machine.cart.travel {
-        let way = travel.max - travel.min;
-        let most = pull_out.largest_acceleration(machine, way);
+    let slides = machine.travels().enumerate().filter_map(|(slide, (_, travel))| {
+        travel.and_then(|travel| Some((within_pull_out(machine, slide, 0.0)?, travel.max - travel.min)))
+    });
+    if let Some((most, way)) = slides.min_by(|a, b| a.0.total_cmp(&b.0)) {
         group
             .add("largest_acceleration", "largest acceleration over the travel", most, "m/s^2")
             .how("half of it up, half down, against friction, as one mass");

@@ -11,14 +11,17 @@ use crate::parameter::{self, Fallback};
 const MOST_DELAY: f64 = 1000.0;
 
 pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Design>> {
-    if machine.stepper().is_some() {
-        return of_stepper(root);
+    if machine.stepper().is_some()
+        && let Some(design) = open_loop(root)?
+    {
+        return Ok(Some(design));
     }
     let Some(field) = root.optional("controller") else { return Ok(None) };
-    let input_unit = if machine.drives[0].amplifier.mode == AmplifierMode::Current { "A" } else { "V" };
-    let field = Field { input_unit, ..field };
+    let field = Field { input_unit: machine.drives[0].amplifier.mode.unit(), ..field };
     let table = field.table()?;
-    table.check_keys(&[], &[])?;
+    if machine.stepper().is_none() {
+        table.check_keys(&[], &[])?;
+    }
     let every = table.number("every")?;
     let delay = table.number("delay")?;
     if delay > MOST_DELAY * every
@@ -58,20 +61,36 @@ pub(super) fn controller(root: &Table, machine: &Machine) -> Result<Option<Desig
 /// Interval between the rows of a stepper's move where none is given, s.
 const EVERY: f64 = 1e-3;
 
-/// The design of a stepper, which has an input shaper at most. None where the file has no move and no controller.
-fn of_stepper(root: &Table) -> Result<Option<Design>> {
+/// Keys of a stepper's controller, the first ones also without feedback.
+const OF_STEPPER: [&str; 6] = ["shaper", "every", "pid", "delay", "limit", "filters"];
+const OF_OPEN_LOOP: usize = 2;
+
+/// The design of a stepper without feedback, which has an input shaper at most. None with feedback, and where the file
+/// has no move and no controller.
+fn open_loop(root: &Table) -> Result<Option<Design>> {
     let Some(field) = root.optional("controller") else {
         let asks = ["move", "tune"].iter().find_map(|key| root.optional(key));
         return Ok(asks.map(|_| Design::open_loop(EVERY, Vec::new())));
     };
     let table = field.table()?;
-    if let Some(key) = table.keys().find(|key| !["shaper", "every"].contains(key)) {
+    if let Some(key) = table.keys().find(|key| !OF_STEPPER.contains(key)) {
         return Err(table
             .optional(key)
             .unwrap_or_else(|| table.field.clone())
-            .fail("a stepper follows its reference without a controller")
-            .allowed("shaper, and every for the interval between rows")
+            .fail("the controller of a stepper corrects the position that its driver is commanded")
+            .allowed("pid, with every, delay, limit, filters and shaper; in open loop shaper and every alone")
             .next("leave it out"));
+    }
+    if table.optional("pid").is_some() {
+        return Ok(None);
+    }
+    if let Some(key) = table.keys().find(|key| !OF_STEPPER[..OF_OPEN_LOOP].contains(key)) {
+        return Err(table
+            .optional(key)
+            .unwrap_or_else(|| table.field.clone())
+            .fail("without pid a stepper follows its reference in open loop, which has no command to correct")
+            .allowed("shaper, and every for the interval between rows")
+            .next("leave it out, or add pid, which corrects the position by an encoder"));
     }
     let every = table.number_if_given("every")?.unwrap_or(EVERY);
     Ok(Some(Design::open_loop(every, shaper(&table)?)))

@@ -59,10 +59,7 @@ impl<'a> Field<'a> {
 
     pub fn number_of(&self, row: &Parameter) -> Result<f64> {
         let unit = parameter::unit_for(row.unit, self.input_unit);
-        let example = match row.unit {
-            "" => row.example.to_string(),
-            _ => format!("\"{}\"", example_for(row, self.input_unit)),
-        };
+        let example = example_for(row, self.input_unit);
         let such_as = match self.key() {
             key if key.starts_with(|c: char| c.is_ascii_digit()) => format!("write for example {example}"),
             key => format!("write for example {key} = {example}"),
@@ -352,22 +349,25 @@ impl<'a> Table<'a> {
     }
 
     fn missing_number(&self, key: &str, row: &Parameter) -> Error {
-        let example = match row.unit {
-            "" => format!("{key} = {}", row.example),
-            _ => format!("{key} = \"{}\"", example_for(row, self.field.input_unit)),
-        };
-        self.missing(key, &format!("for example {example}  # {}", row.sentence))
+        let example = example_for(row, self.field.input_unit);
+        self.missing(key, &format!("for example {key} = {example}  # {}", row.sentence))
     }
 }
 
-/// The example of a row, in amperes where the amplifier takes those.
+/// The example of a row in the unit of the amplifier's input, as a value in the file.
 fn example_for(row: &Parameter, input_unit: &str) -> String {
-    let differs = row.unit != parameter::unit_for(row.unit, input_unit);
-    match input_unit {
-        "A" if differs => row.example.replace(" V", " A"),
-        "m" if differs => row.example.replace(" V", " mm"),
+    let unit = parameter::unit_for(row.unit, input_unit);
+    let example = match (input_unit, unit) {
+        _ if unit == row.unit => row.example.to_string(),
+        ("A", _) => row.example.replace(" V", " A"),
+        // Gains of a stepper's controller.
+        ("m", "") => "0.5".into(),
+        ("m", "1/s") => "40 1/s".into(),
+        ("m", "s") => "0.2 ms".into(),
+        ("m", _) => row.example.replace(" V", " mm"),
         _ => row.example.to_string(),
-    }
+    };
+    if unit.is_empty() { example } else { format!("\"{example}\"") }
 }
 
 /// The table that a misplaced key belongs to.

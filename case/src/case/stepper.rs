@@ -12,8 +12,8 @@ use crate::solve::{Jump, first_jump};
 const NO_MOTOR: [&str; 3] = [
     "this needs a motor that is commanded by voltage or current, and the case describes a stepper",
     "[motor] and [amplifier]",
-    "choose the moves of a stepper with `taut plan` and `taut shape`, since it has no controller; see what logs of \
-     moves determine with `taut check` and `taut fit`; export it with `taut export c`, `fmu` or `json`",
+    "log moves of the stepper, with long ramps at several speeds and changes of speed in between: `taut check` reports \
+     what they determine, `taut fit` fits it; `taut plan` and `taut shape` choose its moves",
 ];
 
 /// Refuses a stepper where a motor that is commanded by voltage or current is needed.

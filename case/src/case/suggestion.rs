@@ -26,6 +26,14 @@ const HELD: f64 = 1e12;
 /// A PID controller for an axis, as a case file has it.
 pub(super) fn pid(machine: &Machine, every: f64, delay: f64) -> String {
     let Pid { proportional, integral, derivative, .. } = gains(machine, every, delay);
+    if machine.stepper().is_some() {
+        return format!(
+            "pid = {{ proportional = {}, integral = \"{} 1/s\", derivative = \"{} ms\" }}",
+            two(proportional),
+            two(integral),
+            two(1e3 * derivative)
+        );
+    }
     let unit = unit(machine);
     format!(
         "pid = {{ proportional = \"{} {unit}/mm\", integral = \"{} {unit}/(mm s)\", derivative = \"{} {unit} s/m\" }}",
@@ -42,12 +50,20 @@ pub(super) fn controller(machine: &Machine) -> String {
 
 /// The derivative of a PID controller of this axis, as a case file has it.
 pub(crate) fn derivative(machine: &Machine, every: f64, delay: f64) -> String {
-    format!("derivative = \"{} {} s/m\"", two(gains(machine, every, delay).derivative), unit(machine))
+    let value = gains(machine, every, delay).derivative;
+    match machine.stepper() {
+        Some(_) => format!("derivative = \"{} ms\"", two(1e3 * value)),
+        None => format!("derivative = \"{} {} s/m\"", two(value), unit(machine)),
+    }
 }
 
 /// The proportional gain, as a case file has it.
 pub(super) fn proportional(machine: &Machine, every: f64, delay: f64) -> String {
-    format!("proportional = \"{} {}/mm\"", two(1e-3 * gains(machine, every, delay).proportional), unit(machine))
+    let value = gains(machine, every, delay).proportional;
+    match machine.stepper() {
+        Some(_) => format!("proportional = {}", two(value)),
+        None => format!("proportional = \"{} {}/mm\"", two(1e-3 * value), unit(machine)),
+    }
 }
 
 fn unit(machine: &Machine) -> &'static str {
@@ -58,7 +74,8 @@ fn unit(machine: &Machine) -> &'static str {
 /// gains for an axis without a mode.
 fn gains(machine: &Machine, every: f64, delay: f64) -> Pid {
     let ordinary = Pid {
-        proportional: 2000.0,
+        // The field of a stepper already holds the rotor.
+        proportional: if machine.stepper().is_some() { 0.1 } else { 2000.0 },
         integral: 2e4,
         derivative: 25.0,
         filter: 200.0,

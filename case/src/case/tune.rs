@@ -111,16 +111,16 @@ pub(super) fn tuning(
     };
     let tuned_by = design.structure.tunable().tuned_by();
     let placed = tuned_by == TunedBy::Bandwidth;
-    // Of steppers it says for which family moves are planned.
-    let of_stepper = machine.stepper().is_some();
-    if let Some(key) = table.keys().find(|key| of_stepper && !["spread", "load", "places"].contains(key)) {
+    // Of steppers in open loop it says for which family moves are planned.
+    let of_open_loop = design.is_open_loop();
+    if let Some(key) = table.keys().find(|key| of_open_loop && !["spread", "load", "places"].contains(key)) {
         return Err(table
             .optional(key)
             .unwrap_or_else(|| field.clone())
-            .fail("a stepper has no gains to tune")
+            .fail("a stepper in open loop has no gains to tune")
             .allowed("spread, load and places: the machines that a move is planned for"));
     }
-    if tuned_by == TunedBy::Nothing && !of_stepper {
+    if tuned_by == TunedBy::Nothing && !of_open_loop {
         return Err(field
             .fail(format!("the gains of {} cannot be tuned", design.structure.name()))
             .allowed(format!("a controller with {}", tunable())));

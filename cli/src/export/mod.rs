@@ -45,10 +45,7 @@ pub fn run(args: &Args) -> Outcome {
     };
     let common = &args.common;
     check(args, target)?;
-    let case = match target {
-        TargetName::C | TargetName::Fmu | TargetName::Json => common.open_for(path, Files::All)?,
-        _ => common.open_motors_for(path, Files::All)?,
-    };
+    let case = common.open_for(path, Files::All)?;
     let own = match common::is_standard_input(path) {
         true => "axis".to_string(),
         false => path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default(),

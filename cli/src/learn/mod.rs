@@ -23,7 +23,7 @@ pub fn run(args: &Args) -> Outcome {
     // Without --map there is a log.
     let Some(log) = args.log.as_deref() else { return map::run(args) };
     let common = &args.common;
-    let case = common.open_motors_for(&args.case, Files::Nothing)?;
+    let case = common.open_for(&args.case, Files::Nothing)?;
     let (design, moves) = case.moves_named(&args.case, &args.moves)?;
     let motion: &Move = match &moves[..] {
         [one] => one,

@@ -9,7 +9,7 @@ use crate::folder::{self, Folder};
 use crate::interrupt::Interrupt;
 use std::fmt::Write;
 use std::path::Path;
-use taut::case::{Case, Files, Move, needs_motors};
+use taut::case::{Case, Files, Move};
 use taut::control::fed::Fed;
 use taut::control::{Accuracy, Added, Controller, Loop, MoveRun, Rows, Standard, each, stream, worst};
 use taut::design::Design;
@@ -86,7 +86,6 @@ fn added(args: &Args, cases: &[Case]) -> Result<Option<Vec<Added>>> {
     let ([case], [path]) = (cases, &args.case[..]) else {
         return wrong(format!("a signal is of one case, and there are {}", cases.len()), "name one case");
     };
-    needs_motors(&case.machine)?;
     let (_, moves) = case.moves_named(path, &args.moves)?;
     if moves.len() > 1 {
         return wrong(format!("a signal is of one move, and the case has {}", moves.len()), "name one with --move");
@@ -100,10 +99,10 @@ fn added(args: &Args, cases: &[Case]) -> Result<Option<Vec<Added>>> {
 /// The files that will be written, but for plots.
 fn names(args: &Args, case: &Case, path: &Path) -> Result<Vec<String>> {
     let (_, moves) = case.moves_named(path, &args.moves)?;
-    // A stepper has no samples.
-    let tables: &[&str] = match case.machine.stepper() {
-        Some(_) => &["csv", "events.csv"],
-        None => &["csv", "events.csv", "samples.csv"],
+    // A stepper in open loop has no samples.
+    let tables: &[&str] = match case.controller.as_ref().is_some_and(Design::is_open_loop) {
+        true => &["csv", "events.csv"],
+        false => &["csv", "events.csv", "samples.csv"],
     };
     let tables = moves.iter().flat_map(|one| tables.iter().map(move |ending| format!("{}.{ending}", one.file_name())));
     let report = (!args.common.no_report).then(|| "report.html".to_string());
@@ -128,7 +127,10 @@ fn one<'a>(
     interrupt: &Interrupt,
 ) -> std::result::Result<Done<'a>, Failure> {
     let machine = &case.machine;
-    let mut own = Standard::of_drives(design, machine)?;
+    let mut own = match added {
+        Some(_) => Standard::of_every_drive(design, machine)?,
+        None => Standard::of_drives(design, machine)?,
+    };
     let profiles = motion.references(design);
     let rows = Rows { until: motion.until, every: motion.every, window: motion.window };
     let name = motion.file_name();
@@ -166,7 +168,7 @@ fn one<'a>(
         writer.finish().map_err(Failure::work)?;
         files.push(format!("{name}.csv"));
         files.push(folder.write_events(&name, &run.outcome.events).map_err(Failure::work)?);
-        if machine.stepper().is_none() {
+        if !design.is_open_loop() {
             files.push(write_samples(folder, &name, case, &run).map_err(Failure::work)?);
         }
     }

@@ -20,7 +20,7 @@ use taut_report::tune::{Work, figures, hertz, page};
 /// Reads the case, tunes, writes, tells.
 pub fn run(args: &Args) -> Outcome {
     let common = &args.common;
-    let case = common.open_motors_for(&args.case, Files::Nothing)?;
+    let case = common.open_for(&args.case, Files::Nothing)?;
     let tuning = tuning(args, &case);
     let target = target(args, &case)?;
     let (found, signal) = match args.evaluate {

@@ -1,6 +1,6 @@
 //! The accuracy of a move: how far its positions may be wrong, by a second run.
 
-use super::outcome::{MoveRun, Rows, at_rest, driven};
+use super::outcome::{MoveRun, Rows, at_rest, corrected, driven};
 use super::sampled::{Controller, Loop};
 use super::sampling::Sampled;
 use crate::case::Experiment;
@@ -71,24 +71,21 @@ impl<'a> Accuracy<'a> {
         flow: &mut dyn FnMut() -> Flow,
     ) -> Result<Option<PositionError>> {
         let Self { machine, mechanism, profiles, timing, solver, experiment, estimate } = self;
-        let solvers = [solver, ErrorEstimate::second(solver, is_sampled(machine))];
+        let solvers = [solver, ErrorEstimate::second(solver, !controllers.is_empty())];
         let course = Course::new(&mechanism, &experiment);
         controllers.iter_mut().for_each(|controller| controller.reset());
-        let mut sampled = Sampled::new(machine, controllers, timing, profiles, false).until(experiment.until);
+        let sampled = Sampled::new(machine, controllers, timing, profiles, false).until(experiment.until);
+        let mut sampled = sampled.correcting(corrected(machine, &experiment));
         let error = estimate.finish_driven(&mechanism, &course, solvers, (&run.outcome, flow), &mut |second| {
-            driven(second, machine, &experiment, &mut sampled, |_, _, _| {})
+            driven(second, &experiment, &mut sampled, |_, _, _| {})
         })?;
         let bound = run.rounding.map_or(0.0, |bound| bound.value);
         Ok(error.map(|error| PositionError { value: error.value.max(bound), ..error }))
     }
 
-    /// Basis of the estimate for a move of this machine, in words.
-    pub fn basis(machine: &Machine) -> &'static str {
-        ErrorEstimate::basis(Solver::for_machine(machine), is_sampled(machine))
+    /// Basis of the estimate for a run of this machine, in words.
+    pub fn basis(machine: &Machine, run: &MoveRun) -> &'static str {
+        // A stepper without a controller follows its reference by itself.
+        ErrorEstimate::basis(Solver::for_machine(machine), run.samples.0 > 0)
     }
-}
-
-/// True if a controller reads the motion; a stepper follows its reference by itself.
-fn is_sampled(machine: &Machine) -> bool {
-    machine.stepper().is_none()
 }

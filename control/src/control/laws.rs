@@ -79,7 +79,7 @@ impl Law for AnyLaw {
 
 impl Law for OpenLoop {
     fn about(&self) -> &'static str {
-        "the reference is the command"
+        "the reference is the command, without a correction"
     }
 
     fn commands_current(&self) -> bool {
@@ -90,8 +90,8 @@ impl Law for OpenLoop {
         true
     }
 
-    fn step<C: Calculator>(&self, _: &mut C, seen: &LawInputs<C::N>) -> C::N {
-        seen.reference.position
+    fn step<C: Calculator>(&self, c: &mut C, _: &LawInputs<C::N>) -> C::N {
+        c.number(0.0)
     }
 
     fn limited<C: Calculator>(&self, _: &mut C, _: C::N, _: C::N) {}

@@ -122,11 +122,12 @@ pub(super) fn unrecorded(
     see: impl FnMut(f64, &State, &[f64]),
 ) -> Result<solve::Outcome> {
     controllers.iter_mut().for_each(|controller| controller.reset());
-    let mut sampled = Sampled::new(machine, controllers, *timing, profiles, false).until(experiment.until);
+    let sampled = Sampled::new(machine, controllers, *timing, profiles, false).until(experiment.until);
+    let mut sampled = sampled.correcting(corrected(machine, experiment));
     let sink = &mut |_: &Trajectory| Flow::Continue;
     let observer = observer.map(|observer| observer as &mut dyn Observe);
     let run = solve::Run::reading(read(machine), experiment, solver, Detail::None, observer, sink)?;
-    Ok(driven(run, machine, experiment, &mut sampled, see))
+    Ok(driven(run, experiment, &mut sampled, see))
 }
 
 /// Runs controllers along their profiles until `until`, s, with a row at each sample, and returns the samples: rows and
@@ -142,25 +143,30 @@ pub(crate) fn recorded(
     timing.check(until)?;
     let experiment = at_rest(machine, profiles, until, timing.every.min(until));
     controllers.iter_mut().for_each(|controller| controller.reset());
-    let mut sampled = Sampled::new(machine, controllers, *timing, profiles, true).until(until);
+    let sampled = Sampled::new(machine, controllers, *timing, profiles, true).until(until);
+    let mut sampled = sampled.correcting(corrected(machine, &experiment));
     let run = solve::Run::new(machine, &experiment, solver, Detail::Full, None, sink)?;
-    driven(run, machine, &experiment, &mut sampled, |_, _, _| {});
+    driven(run, &experiment, &mut sampled, |_, _, _| {});
     Ok(sampled.kept.unwrap_or_default())
 }
 
-/// Runs to the end: steppers along their references, other motors by sampled controllers.
+/// Runs to the end: by sampled controllers, or without them, as steppers follow their references by themselves.
 pub(super) fn driven(
     mut run: solve::Run,
-    machine: &Machine,
     experiment: &Experiment,
     sampled: &mut Sampled,
     see: impl FnMut(f64, &State, &[f64]),
 ) -> solve::Outcome {
-    if machine.stepper().is_some() {
+    if sampled.is_open() {
         return run.follow(&experiment.inputs);
     }
     sampled.drive(&mut run, experiment.until, see);
     run.finish()
+}
+
+/// The references that the controllers of a machine correct: those of steppers.
+pub(super) fn corrected<'a>(machine: &Machine, experiment: &'a Experiment) -> &'a [Signal] {
+    if machine.stepper().is_some() { &experiment.inputs } else { &[] }
 }
 
 /// A run from rest at the start of the profiles; its inputs are the references of steppers, none for other motors.
@@ -244,16 +250,19 @@ fn run(
         return Err(Error::new(format!("the cart cannot settle within {:?} m", rows.window)).allowed("above zero"));
     }
     let (loads, drives) = (machine.geometry().slides.len(), machine.drives.len());
-    if profiles.len() != loads || controllers.len() != drives {
+    // Steppers need no controllers.
+    let is_open = controllers.is_empty() && machine.stepper().is_some();
+    if profiles.len() != loads || controllers.len() != drives && !is_open {
         let what = format!("{} controllers and {} profiles", controllers.len(), profiles.len());
         return Err(Error::new(what).allowed(format!("{drives} controllers, one for each drive, and {loads} profiles")));
     }
     let experiment = at_rest(machine, profiles, rows.until, rows.every);
     controllers.iter_mut().for_each(|controller| controller.reset());
-    let mut sampled = Sampled::new(machine, controllers, *timing, profiles, keep).until(rows.until);
+    let sampled = Sampled::new(machine, controllers, *timing, profiles, keep).until(rows.until);
+    let mut sampled = sampled.correcting(corrected(machine, &experiment));
     let mut gauge = Gauge::new(machine, &experiment, profiles, rows.window);
     let run = solve::Run::reading(read(machine), &experiment, solver, detail, Some(&mut gauge), sink)?;
-    let mut outcome = driven(run, machine, &experiment, &mut sampled, |_, _, _| {});
+    let mut outcome = driven(run, &experiment, &mut sampled, |_, _, _| {});
     // It holds without a controller, which answers to what rounding does.
     let rounding = outcome.error.take();
     let (mut figures, metrics) = gauge.finish(&outcome.events);

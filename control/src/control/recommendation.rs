@@ -11,6 +11,7 @@ use crate::case::{Accepted, Case, Files};
 use crate::error::{Error, Result};
 use crate::log::read_accelerometer;
 use crate::mechanism::Label;
+use crate::parameter;
 use crate::reach::quickest::within_pull_out;
 use crate::reach::resonance::{Drive, Reach, Resonance, reaches, resonances};
 use std::path::{Path, PathBuf};
@@ -326,7 +327,8 @@ fn model(args: &Question, file: &Path) -> Result<(Vec<Source>, Vec<PathBuf>)> {
         let modes = resonances(&case.machine, drive, number).map_err(|e| e.in_file(file))?;
         let coordinate = (labels.len() > 1).then_some(Coordinate { label: *label, letter });
         // Suggested accelerations are printed to 100 mm/s².
-        let acceleration = within_pull_out(&case.machine, number).map(|most| (10.0 * most).floor() / 10.0);
+        let reserve = parameter::default_of("move.plan.reserve").unwrap_or_default();
+        let acceleration = within_pull_out(&case.machine, number, reserve).map(|most| (10.0 * most).floor() / 10.0);
         Ok(Source::Model { title: case.title.clone(), coordinate, drive, modes, acceleration })
     };
     let sources = labels.iter().zip(["x", "y"]).enumerate().map(of_coordinate).collect::<Result<_>>()?;

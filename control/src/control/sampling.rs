@@ -5,6 +5,7 @@ use super::sampled::{Added, Controller, Loop, SLIDES, Sample};
 use super::stepped::{Clocked, Commands, Decision, References};
 use crate::machine::Machine;
 use crate::mechanism::{DRIVES, State};
+use crate::signal::Signal;
 use crate::signal::profile::{Profile, Reference};
 use crate::solve::Run;
 
@@ -24,6 +25,8 @@ pub(super) struct Sampled<'a, 'c> {
     pub(super) kept: Option<Vec<Sample>>,
     /// An input added to the command of the first drive.
     added: Option<&'a Added>,
+    /// References of steppers, to which the commands are added; none for other motors.
+    references: &'a [Signal],
 }
 
 /// The commands of a drive.
@@ -63,6 +66,7 @@ impl<'a, 'c> Sampled<'a, 'c> {
             limited: 0,
             kept: keep.then(Vec::new),
             added: None,
+            references: &[],
         }
     }
 
@@ -77,6 +81,17 @@ impl<'a, 'c> Sampled<'a, 'c> {
     pub(super) fn with(mut self, added: Option<&'a Added>) -> Self {
         self.added = added;
         self
+    }
+
+    /// With these references of steppers, which the commands correct.
+    pub(super) fn correcting(mut self, references: &'a [Signal]) -> Self {
+        self.references = references;
+        self
+    }
+
+    /// True without controllers: steppers then follow their references by themselves.
+    pub(super) fn is_open(&self) -> bool {
+        self.controllers.is_empty()
     }
 
     /// With exact positions instead of counts.
@@ -104,8 +119,12 @@ impl Sampled<'_, '_> {
         }
     }
 
-    /// Holds commands, with signals added to them, until `end`, s; false if the run ends.
+    /// Holds commands, with signals added to them, or corrections of a stepper's reference, until `end`, s; false if the
+    /// run ends.
     fn hold(&self, run: &mut Run, commands: &[f64], end: f64) -> bool {
+        if !self.references.is_empty() {
+            return run.hold_added(self.references, commands, end);
+        }
         let Some(added) = self.added else { return run.hold(commands, end) };
         loop {
             // Clocks of logs are off by up to a hundredth of a sample.

@@ -180,8 +180,14 @@ impl Standard {
         Self { memory: vec![0.0; text.slots.count()], text, inner: None }
     }
 
-    /// A controller for each drive of a machine.
+    /// A controller for each drive of a machine; none for steppers in open loop.
     pub fn of_drives(design: &Design, model: &Machine) -> Result<Vec<Self>> {
+        if design.is_open_loop() { Ok(Vec::new()) } else { Self::of_every_drive(design, model) }
+    }
+
+    /// A controller for each drive of a machine; of steppers in open loop one without feedback, to which signals can be
+    /// added.
+    pub fn of_every_drive(design: &Design, model: &Machine) -> Result<Vec<Self>> {
         (0..model.drives.len()).map(|drive| Text::of_drive(design, model, drive).map(Self::from_text)).collect()
     }
 

@@ -56,6 +56,9 @@ const NEAR: f64 = 0.3;
 /// processor seconds.
 const SAMPLES: u64 = 6_000_000;
 
+/// Duration of a sample of a stepper, which needs the general solver, relative to that of other machines.
+const OF_STEPPER: f64 = 10.0;
+
 /// Maximum number of continuations with the machines that are worst for the result.
 const POLISHED: usize = 8;
 
@@ -211,7 +214,8 @@ impl Work<'_> {
 
     /// Grants a search this many times the budget.
     pub fn grant(&mut self, times: f64) {
-        self.most = self.charged() + (times * self.tuning.effort * SAMPLES as f64) as u64;
+        let duration = if self.case.machine.stepper().is_some() { OF_STEPPER } else { 1.0 };
+        self.most = self.charged() + (times * self.tuning.effort * SAMPLES as f64 / duration) as u64;
     }
 
     /// True if the budget of samples of moves is spent.

@@ -1,6 +1,6 @@
 //! The gains of a design as numbers with names, for a search and for the case file.
 
-use crate::design::placement::commands_current;
+use crate::design::placement::commanded_unit;
 use crate::design::{Design, Filter};
 use crate::machine::Machine;
 use crate::parameter::{self, Parameter, Tuned, find, unit_for};
@@ -48,7 +48,7 @@ fn is_searched(design: &Design, gain: &parameter::InStructure) -> bool {
 
 /// The gains of a design that are not zero, in the order of the case file.
 pub fn gains(design: &Design, machine: &Machine) -> Vec<Gain> {
-    let input = if commands_current(design, machine) { "A" } else { "V" };
+    let input = commanded_unit(design, machine);
     let gain = |(key, gain): (&'static str, parameter::InStructure)| {
         let value = (gain.get)(&design.structure).filter(|value| *value != 0.0)?;
         let unit = find(key).map_or("", |row| unit_for(row.unit, input));

@@ -6,7 +6,7 @@
 //! and the time of the next slip if no observation is long enough. Machines with several drives are observed without
 //! it.
 
-use crate::control::{Loop, Standard, each, recorded};
+use crate::control::{Loop, Sample, Standard, each, recorded};
 use crate::design::Design;
 use crate::error::Result;
 use crate::friction::Side;
@@ -297,7 +297,9 @@ fn seen(
     let samples = recorded(machine, &mut each(&mut controllers), (&timing, &profiles), until, solver, &mut take)?;
     // The last eighth of the observation.
     let late = samples.iter().filter(|sample| sample.drive == 0 && sample.time >= until - 0.125 * watched);
-    let command: Vec<(f64, f64)> = late.map(|sample| (sample.time, sample.given)).collect();
+    // The field of a stepper leads its rotor by the correction and by the error.
+    let lead = |sample: &Sample| if machine.stepper().is_some() { sample.reference - sample.measured } else { 0.0 };
+    let command: Vec<(f64, f64)> = late.map(|sample| (sample.time, sample.given + lead(sample))).collect();
     let command_now = command.last().map_or(0.0, |(_, given)| *given);
     Ok(ObservedSwing { swing: widest(&slides, swung), slides, command: command_now, slope: slope(&command) })
 }

@@ -67,6 +67,8 @@ pub(super) struct Open<const N: usize> {
     pub difference: Complex<f64>,
     /// True if the position loop is closed at a scale.
     has_scale: bool,
+    /// Measured positions per reference without the controller: of steppers, which follow it. None for other motors.
+    fed: Option<Square<N>>,
     /// Slide positions per position that follows the reference, and per disturbance at the command.
     slides: Square<N>,
     pub pushed: Square<N>,
@@ -89,7 +91,8 @@ impl<const N: usize> Open<N> {
         let follows = if has_scale { answer.slides } else { answer.position };
         let (turned, size) = inverse(&follows);
         let slides = over(&answer.slides, &turned, size);
-        Self { own, parts, adjugate, difference, has_scale, slides, pushed, shares: sampled.shares }
+        let fed = sampled.is_fed.then_some(answer.position);
+        Self { own, parts, adjugate, difference, has_scale, fed, slides, pushed, shares: sampled.shares }
     }
 
     /// The two parts of Δ: the loops closed inside the broken one, and the broken loop itself.
@@ -141,15 +144,19 @@ impl<const N: usize> Open<N> {
         most
     }
 
-    /// |S| of the loop that follows the reference.
+    /// Error of the loop per reference: |S|, and |S (1 − G)| if the command is the reference with a correction.
     pub fn following(&self) -> f64 {
-        self.sensitivity(self.outer())
+        let Some(fed) = self.fed else { return self.sensitivity(self.outer()) };
+        let sensitivity = self.closed(self.outer())[0] / self.difference;
+        largest(&(sensitivity * (Square::<N>::identity() - fed)))
     }
 
-    /// T x/y: from the references of the sliding parts to their positions, without feed-forward. 1 for parts that the
-    /// machine does not have.
+    /// T x/y: from the references of the sliding parts to their positions, without feed-forward; (T + S G) x/y if the
+    /// command is the reference with a correction. 1 for parts that the machine does not have.
     pub fn reference_to_slides(&self) -> Square<N> {
-        let mut all = self.slides * (self.closed(self.outer())[1] / self.difference) * self.shares;
+        let [inner, outer] = self.closed(self.outer());
+        let followed = self.fed.map_or(outer, |fed| outer + inner * fed);
+        let mut all = self.slides * (followed / self.difference) * self.shares;
         for slide in (0..N).filter(|&slide| self.shares.column(slide).iter().all(|share| *share == Complex::ZERO)) {
             all[(slide, slide)] = Complex::ONE;
         }

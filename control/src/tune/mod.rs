@@ -215,6 +215,14 @@ fn beginning<'a>(case: &'a Case, tuning: &Tuning) -> Result<(&'a Design, Family,
         Error::new("this case has no controller to tune")
             .next(format!("add [controller] with for example {}", case.suggested_controller()))
     })?;
+    if design.is_open_loop() {
+        return Err(Error::new("a stepper in open loop has no gains to tune: it follows its command without feedback")
+            .next(format!(
+                "choose its moves with `taut plan` and its input shaper with `taut shape`; or, with an encoder, add \
+                 [controller] with for example {}",
+                case.suggested_controller()
+            )));
+    }
     Feedback::new(design, &case.machine)?;
     if !EFFORTS.contains(&tuning.effort) {
         let (least, most) = (EFFORTS.start(), EFFORTS.end());

@@ -9,6 +9,7 @@ use crate::machine::Machine;
 use crate::machine::rigid::Rigid;
 use crate::reach::compensation::Compensation;
 use crate::reach::forward::Forward;
+use crate::reach::quickest::within_pull_out;
 use crate::signal::profile::{Leg, Limits, Profile, Reference};
 
 /// Fractions of the speed and the force allowed by the command limit that a standard move uses.
@@ -85,6 +86,12 @@ fn standard(machine: &Machine, design: &Design) -> Result<Vec<Move>> {
 
 /// Speed (m/s) and acceleration (m/s²) with a reserve below the limits of controller and amplifier.
 fn limits(machine: &Machine, design: &Design) -> (f64, f64) {
+    if machine.stepper().is_some() {
+        // The limit of its command is one of the correction.
+        let slides = 0..machine.geometry().slides.len();
+        let of_slide = |slide| within_pull_out(machine, slide, 1.0 - FORCE);
+        return (MODEST.0, slides.filter_map(of_slide).fold(MODEST.1, f64::min));
+    }
     let rigid = Rigid::new(machine);
     let Some(limit) = limit(machine, design) else { return MODEST };
     let dry = rigid.coulomb[0];

@@ -82,6 +82,8 @@ pub(super) struct Sampled<const N: usize> {
     slides: [Option<usize>; N],
     currents: [usize; N],
     length: f64,
+    /// True if a command is added to the reference, as for steppers.
+    pub is_fed: bool,
     /// Travel of each drive's part of the belt per travel of each slide; zero for missing slides of a machine with more
     /// drives than slides.
     pub shares: Square<N>,
@@ -126,6 +128,7 @@ impl Plant {
             slides: std::array::from_fn(|number| slide(machine, system, number)),
             currents: std::array::from_fn(|drive| find(geometry.drives[drive].current_column).unwrap_or_default()),
             length: length(machine),
+            is_fed: machine.stepper().is_some(),
             shares: Square::from_fn(|drive, slide| {
                 Complex::new(shares[drive].get(slide).copied().unwrap_or_default(), 0.0)
             }),

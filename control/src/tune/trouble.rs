@@ -70,8 +70,14 @@ pub struct Trouble {
 
 /// The problem of a run move, if any.
 pub fn trouble(machine: &Machine, design: &Design, run: &MoveRun, motion: &Move) -> Option<Trouble> {
-    if machine.stepper().is_some() {
-        return lost_steps(machine, design, run, motion);
+    // A loop that has arrived has made up for lost steps.
+    if (design.is_open_loop() || run.figures.settling.is_none())
+        && let Some(trouble) = lost_steps(machine, design, run, motion)
+    {
+        return Some(trouble);
+    }
+    if design.is_open_loop() {
+        return None;
     }
     let targets: Vec<f64> = motion.profiles.iter().map(Profile::target).collect();
     let at = Operation::at(&targets);

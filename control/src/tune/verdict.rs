@@ -188,7 +188,7 @@ impl Work<'_> {
             let machine = match self.stages.get(place) {
                 Some(machine) => machine,
                 None => {
-                    corner = self.family.stage_at(&machines[place]);
+                    corner = self.family.stage_at(&machines[place]).interpolating();
                     &corner
                 }
             };

@@ -52,7 +52,7 @@ pub(super) struct Work<'a> {
     pub asked: Vec<f64>,
     /// The shaped moves; a search does not change the shaper.
     pub shaped: Vec<Vec<Profile>>,
-    /// All machines of the family, and their frequency responses for a controller.
+    /// All machines of the family, steppers without microsteps, and their frequency responses for a controller.
     pub stages: Vec<Machine>,
     pub plants: Vec<Plant>,
     /// Machines on which the limits have to hold during the search.
@@ -113,7 +113,7 @@ impl<'a> Work<'a> {
             moves,
             asked,
             shaped: moves.iter().map(|motion| motion.references(design)).collect(),
-            stages: family.machines.iter().map(|machine| family.stage_at(machine)).collect(),
+            stages: family.machines.iter().map(|machine| family.stage_at(machine).interpolating()).collect(),
             plants,
             set: vec![0],
             more: Vec::new(),

@@ -140,6 +140,17 @@ impl Tunable for Pid {
     fn placed(&self, _: &Design, machine: &Machine, bandwidth: f64, damping: f64) -> Option<Structure> {
         let rigid = Rigid::new(machine);
         let (mass, w) = (rigid.mass, 2.0 * PI * bandwidth);
+        if machine.stepper().is_some() {
+            // M s² + d s + k (1 + K_p + K_d s + K_i/s): the field holds the rotor like a spring
+            let stiffness = rigid.field * (1.0 + self.proportional);
+            let damper = 2.0 * damping * (mass * stiffness).max(0.0).sqrt();
+            let kept = |old: f64, new: f64| if old == 0.0 { 0.0 } else { new };
+            return Some(Structure::Pid(Pid {
+                integral: kept(self.integral, w * (1.0 + self.proportional)),
+                derivative: kept(self.derivative, least(damper, rigid.drag()) / rigid.field),
+                ..*self
+            }));
+        }
         let (drag, push) = (rigid.drag(), rigid.force_per_command().abs());
         let sign = rigid.force_per_command().signum();
         // s³ + (d + g K_d)/M s² + g K_p/M s + g K_i/M
@@ -164,8 +175,8 @@ impl Tunable for Pid {
         let rigid = Rigid::new(machine);
         let late = design.delay + 0.5 * design.every + 1.0 / (2.0 * PI * self.filter);
         let (drag, push) = (rigid.drag(), rigid.force_per_command());
-        // M ẍ + d ẋ = g u:  k = g/d, τ = M/d; without drag k/τ is what counts.
-        if drag <= 0.0 {
+        // M ẍ + d ẋ = g u:  k = g/d, τ = M/d; without drag k/τ is what counts. The field of a stepper is a spring.
+        if drag <= 0.0 || machine.stepper().is_some() {
             return Vec::new();
         }
         let (lag, gain) = (rigid.mass / drag, push / drag);

@@ -2,6 +2,7 @@
 
 use super::{AmplifierMode, DriveUnit, Machine, SlideAt};
 use crate::calculator::{Calculator, Evaluation, Number, at_least, less, more};
+use crate::mechanism::Phases;
 use crate::signal::profile::Reference;
 
 /// Largest speed of a reference that counts as rest, m/s, and largest acceleration that counts as none, m/s²: what
@@ -34,6 +35,8 @@ pub struct Rigid {
     inductance: f64,
     gain: f64,
     mode: AmplifierMode,
+    /// N T_h/r²: stiffness of the field that holds the rotor of a stepper, N/m; zero for other motors.
+    pub field: f64,
 }
 
 impl Rigid {
@@ -88,6 +91,7 @@ impl Rigid {
             inductance: motor.inductance,
             gain: amplifier.gain,
             mode: amplifier.mode,
+            field: Phases::of_motor(motor, amplifier).map_or(0.0, |phases| phases.stiffness() / (r * r)),
         }
     }
 
@@ -189,7 +193,7 @@ impl Rigid {
         c.name("per_ampere", per_ampere)
     }
 
-    /// Command, V or A, for `force` (N, changing at `rate`, N/s), the rotor's own included, while the drive pulley moves
+    /// Command, V or A, or the lead of a stepper's field in m, for `force` (N, changing at `rate`, N/s), the rotor's own included, while the drive pulley moves
     /// like this.
     pub fn command(&self, force: f64, rate: f64, drive: &Reference) -> f64 {
         self.command_by(&mut Evaluation::plain(), force, rate, drive)
@@ -197,12 +201,11 @@ impl Rigid {
 
     /// As the function without `_by`, for any calculator.
     pub fn command_by<C: Calculator>(&self, c: &mut C, force: C::N, rate: C::N, drive: &Reference<C::N>) -> C::N {
-        let (current, voltage) = self.electrical_by(c, force, rate, drive);
-        match self.mode {
-            // Steppers have no force command, so this is never evaluated for one.
-            AmplifierMode::Current | AmplifierMode::Position => current / self.gain,
-            AmplifierMode::Voltage => voltage / self.gain,
+        if self.mode == AmplifierMode::Position {
+            return force / (self.field * self.gain);
         }
+        let (current, voltage) = self.electrical_by(c, force, rate, drive);
+        if self.mode == AmplifierMode::Current { current / self.gain } else { voltage / self.gain }
     }
 
     /// A feed-forward command at this speed of the drive pulley in two parts: a current for a current loop, A, and the
@@ -218,7 +221,7 @@ impl Rigid {
         [c.name("inner", inner), back]
     }
 
-    /// Force per command at rest, N/V or N/A.
+    /// Force per command at rest, N/V, N/A or N/m.
     pub fn force_per_command(&self) -> f64 {
         1.0 / self.command(1.0, 0.0, &Reference::default())
     }

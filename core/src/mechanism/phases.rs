@@ -111,10 +111,17 @@ impl Phases {
     #[inline(always)]
     pub fn rate(&self, phase: usize, angle: f64, speed: f64, current: f64, told: f64) -> PhaseRate {
         let (sin, cos) = (self.electrical(angle) - FRAC_PI_2 * phase as f64).sin_cos();
+        let along = (self.electrical(told) - FRAC_PI_2 * phase as f64).cos();
+        self.rate_at([sin, cos], along, speed, current)
+    }
+
+    /// Rate of a phase current without −R i/L, with sine and cosine of the rotor's electrical angle ε − σ and the cosine
+    /// of the commanded one, ψ − σ.
+    #[inline(always)]
+    pub fn rate_at(&self, [sin, cos]: [f64; 2], along: f64, speed: f64, current: f64) -> PhaseRate {
         let (k, n, l) = (self.torque_constant, self.teeth, self.inductance);
         // e = −K_m φ̇ sin(ε − σ)
         let (emf, by_angle, by_speed) = (-k * speed * sin, -k * speed * n * cos, -k * sin);
-        let along = (self.electrical(told) - FRAC_PI_2 * phase as f64).cos();
         let voltage = match self.regulator {
             // v = V cos(ψ − σ)
             None => self.supply * along,

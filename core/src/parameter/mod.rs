@@ -175,11 +175,18 @@ impl Arm {
 /// Unit of the amplifier's input: V in voltage mode, A in current mode; m for a stepper.
 pub const INPUT: &str = "V or A";
 
-/// Unit of a parameter for an amplifier input in `input` (V or A): its own, or the matching one of two, the first in
+/// Unit of a parameter for an amplifier input in `input` (V, A or m): its own, or the matching one of two, the first in
 /// volts.
 pub fn unit_for(unit: &'static str, input: &str) -> &'static str {
     match unit.split_once(" or ") {
-        Some(_) if unit == INPUT && input == "m" => "m",
+        // The controller of a stepper corrects a position.
+        Some((volts, _)) if input == "m" => match volts {
+            "V/m" => "",
+            "V/(m s)" => "1/s",
+            "V s/m" => "s",
+            "V/s" => "m/s",
+            _ => "m",
+        },
         Some((volts, amperes)) => {
             if input == "A" {
                 amperes

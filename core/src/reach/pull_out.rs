@@ -1,4 +1,4 @@
-//! Pull-out torque of a stepper over speed, and the acceleration that it allows.
+//! Pull-out torque of a stepper over speed.
 //!
 //! At a constant speed ω the phase currents become periodic. With the rotor behind the field by the electrical angle δ,
 //! ψ = ε + δ, both phases give the same mean torque, and the detents none:
@@ -17,7 +17,6 @@
 //! ```
 
 use crate::golden;
-use crate::machine::rigid::Rigid;
 use crate::machine::{DriveUnit, Machine};
 use crate::mechanism::Phases;
 use crate::number::engineering;
@@ -37,18 +36,12 @@ const ANGLES: usize = 18;
 const MOST_ANGLE: f64 = 1.5 * PI;
 const SECTIONS: usize = 16;
 
-/// Maximum number of periods until the current is periodic, and its tolerance relative to the amplitude.
-const PERIODS: usize = 400;
+/// Maximum number of half periods until the current is periodic, and its tolerance relative to the amplitude.
+const HALVES: usize = 800;
 const REPEATS: f64 = 1e-7;
 
 /// Below this number of full steps per second it is taken to be at rest.
 const SLOW: f64 = 4.0;
-
-/// Number of speeds from rest to the largest one at which an acceleration is checked.
-const SPEEDS: usize = 24;
-
-/// Halvings of the interval between two of these speeds.
-const HALVINGS: usize = 20;
 
 /// Number of intervals of a [`Curve`] up to the speed at which resistance equals reactance, where it bends.
 const BELOW: usize = 8;
@@ -112,23 +105,17 @@ impl Curve {
     }
 }
 
-/// A stepper and its load as one mass.
+/// A stepper, for its pull-out torque at any speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PullOut {
     phases: Phases,
-    rigid: Rigid,
 }
 
 impl PullOut {
-    /// The model of an axis with a stepper.
+    /// The motor of the first drive of a machine with steppers.
     pub fn new(machine: &Machine) -> Option<Self> {
         let unit = &machine.drives[0];
-        Some(Self { phases: Phases::of_motor(&unit.motor, &unit.amplifier)?, rigid: Rigid::new(machine) })
-    }
-
-    /// Total moving mass at the belt, kg.
-    pub fn mass(&self) -> f64 {
-        self.rigid.mass
+        Some(Self { phases: Phases::of_motor(&unit.motor, &unit.amplifier)? })
     }
 
     /// Full steps per second at a speed of the rotor, rad/s.
@@ -139,38 +126,6 @@ impl PullOut {
     /// The pull-out torque at a speed of the rotor, rad/s, N m.
     pub fn torque(&self, speed: f64) -> f64 {
         torque(&self.phases, speed)
-    }
-
-    /// Largest constant acceleration, m/s², for a move over this distance, m, accelerating over one half and braking
-    /// over the other, with the motor within its pull-out torque at every speed; zero if friction alone exceeds it.
-    pub fn largest_acceleration(&self, machine: &Machine, way: f64) -> f64 {
-        let r = machine.pulley_radius;
-        let at_rest = (self.torque(0.0) / r - self.rigid.friction(0.0, 1.0).1) / self.rigid.mass;
-        if !(at_rest > 0.0 && way > 0.0) {
-            return 0.0;
-        }
-        let top = (at_rest * way).sqrt();
-        let speeds: Vec<f64> = (0..=SPEEDS).map(|k| top * k as f64 / SPEEDS as f64).collect();
-        let left = |speed: f64| {
-            let (viscous, dry) = self.rigid.friction(speed, 1.0);
-            (self.torque(speed / r) / r - viscous - dry - self.rigid.constant.abs()) / self.rigid.mass
-        };
-        let all: Vec<f64> = speeds.iter().map(|speed| left(*speed)).collect();
-        // The speed v is reached with a = v²/way, if all lower speeds allow this acceleration.
-        let mut least = f64::INFINITY;
-        for (k, (speed, own)) in speeds.iter().zip(&all).enumerate() {
-            let wanted = speed * speed / way;
-            if least.min(*own) < wanted {
-                let (mut low, mut high) = (speeds[k.saturating_sub(1)], *speed);
-                for _ in 0..HALVINGS {
-                    let middle = 0.5 * (low + high);
-                    if least.min(left(middle)) < middle * middle / way { high = middle } else { low = middle }
-                }
-                return (low * low / way).max(0.0);
-            }
-            least = least.min(*own);
-        }
-        least.min(top * top / way).max(0.0)
     }
 }
 
@@ -224,9 +179,10 @@ fn torque(phases: &Phases, speed: f64) -> f64 {
         return torque;
     }
     let at = |k: usize| MOST_ANGLE * k as f64 / ANGLES as f64;
+    let half = HalfPeriod::new(phases, speed);
     // The current at one angle is a good start for the next.
     let mut current = 0.0;
-    let mut torque = |lead: f64| mean_torque(phases, speed, lead, &mut current);
+    let mut torque = |lead: f64| mean_torque(phases, half.as_ref(), lead, &mut current);
     let torques: Vec<f64> = (0..=ANGLES).map(|k| torque(at(k))).collect();
     let best = (0..=ANGLES).fold(0, |best, k| if torques[k] > torques[best] { k } else { best });
     let about = [at(best.saturating_sub(1)), at((best + 1).min(ANGLES))];
@@ -244,45 +200,81 @@ fn regulated(phases: &Phases, speed: f64) -> Option<f64> {
     (voltage <= phases.supply).then_some(phases.torque_constant * amplitude)
 }
 
+/// Sine and cosine of the rotor's electrical angle over half a period at a constant speed, at the ends and in the middle
+/// of each step of the integration.
+struct HalfPeriod {
+    /// rad/s
+    speed: f64,
+    /// Length of a step, s.
+    step: f64,
+    angles: Vec<[f64; 2]>,
+}
+
+impl HalfPeriod {
+    /// None at rest.
+    fn new(phases: &Phases, speed: f64) -> Option<Self> {
+        if steps_per_second(phases, speed) < SLOW {
+            return None;
+        }
+        let half = PI / (phases.teeth * speed);
+        let fastest = (phases.resistance / phases.inductance).max(phases.regulator.unwrap_or(0.0));
+        let steps = (0.5 * STEPS).max((half * fastest / FINE).ceil());
+        let angle = |k: usize| (PI * k as f64 / (2.0 * steps)).sin_cos();
+        Some(Self { speed, step: half / steps, angles: (0..=2 * steps as usize).map(|k| angle(k).into()).collect() })
+    }
+
+    /// The phase current after half a period, A, and the mean torque of both phases in it, N m, with the field ahead by
+    /// the electrical angle `lead`, rad.
+    fn run(&self, phases: &Phases, lead: f64, mut current: f64) -> (f64, f64) {
+        let (h, decay, (sin_lead, cos_lead)) = (self.step, phases.resistance / phases.inductance, lead.sin_cos());
+        let rate = |k: usize, current: f64| {
+            // ψ = ε + δ
+            let along = self.angles[k][1] * cos_lead - self.angles[k][0] * sin_lead;
+            phases.rate_at(self.angles[k], along, self.speed, current).value - decay * current
+        };
+        let mut sum = 0.0;
+        for k in (0..self.angles.len() - 1).step_by(2) {
+            let k1 = rate(k, current);
+            let k2 = rate(k + 1, current + 0.5 * h * k1);
+            let k3 = rate(k + 1, current + 0.5 * h * k2);
+            let k4 = rate(k + 2, current + h * k3);
+            let next = current + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+            sum += current * self.angles[k][0] + next * self.angles[k + 2][0];
+            current = next;
+        }
+        // 2 · mean of −K_m i sin ε, by trapezia
+        (current, -phases.torque_constant * sum / (0.5 * (self.angles.len() - 1) as f64))
+    }
+}
+
 /// T(δ) at this speed, N m; the phase current at the end of the last period, A, is the start of the next call.
-fn mean_torque(phases: &Phases, speed: f64, lead: f64, begin: &mut f64) -> f64 {
-    if steps_per_second(phases, speed) < SLOW {
+fn mean_torque(phases: &Phases, half: Option<&HalfPeriod>, lead: f64, begin: &mut f64) -> f64 {
+    let Some(half) = half else {
         // At rest τ = K_m (−i_a sin ε + i_b cos ε) does not depend on ε.
         let angle = -FRAC_PI_4 / phases.teeth;
         let [a, b] = phases.at_rest(angle + lead / phases.teeth);
         let free = Phases { detent_torque: 0.0, ..*phases };
         return free.torque(angle, [a, b]).0;
-    }
-    let period = 2.0 * PI / (phases.teeth * speed);
-    let fastest = (phases.resistance / phases.inductance).max(phases.regulator.unwrap_or(0.0));
-    let steps = STEPS.max((period * fastest / FINE).ceil());
-    let h = period / steps;
-    let rate = |time: f64, current: f64| {
-        // ε is zero at time zero.
-        let angle = speed * time - FRAC_PI_4 / phases.teeth;
-        let beyond = phases.rate(0, angle, speed, current, angle + lead / phases.teeth).value;
-        beyond - phases.resistance / phases.inductance * current
     };
-    let (mut current, mut torque) = (*begin, 0.0);
-    for _ in 0..PERIODS {
-        let before: f64 = current;
-        torque = 0.0;
-        for step in 0..steps as usize {
-            let time = h * step as f64;
-            let k1 = rate(time, current);
-            let k2 = rate(time + 0.5 * h, current + 0.5 * h * k1);
-            let k3 = rate(time + 0.5 * h, current + 0.5 * h * k2);
-            let k4 = rate(time + h, current + h * k3);
-            let next = current + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
-            let sine = |time: f64| (phases.teeth * speed * time).sin();
-            torque -= phases.torque_constant * (current * sine(time) + next * sine(time + h)) / steps;
-            current = next;
-        }
-        if (current - before).abs() <= REPEATS * phases.amplitude {
+    // The second half is the first with the other sign, so the current is a fixed point of c ↦ −i(T/2).
+    let (mut before, mut torque): (Option<[f64; 2]>, f64) = (None, 0.0);
+    for _ in 0..HALVES {
+        let start = *begin;
+        let (end, own) = half.run(phases, lead, start);
+        (*begin, torque) = (-end, own);
+        if (*begin - start).abs() <= REPEATS * phases.amplitude {
             break;
         }
+        // The map is nearly linear: a secant step from two evaluations.
+        if let Some([first, image]) = before.take() {
+            let slope = (*begin - image) / (start - first);
+            if slope.abs() < 1.0 {
+                *begin = start + (*begin - start) / (1.0 - slope);
+            }
+        } else {
+            before = Some([start, *begin]);
+        }
     }
-    *begin = current;
     torque
 }
 
@@ -312,7 +304,8 @@ mod tests {
         for speed in [5.0, 20.0, 25.0] {
             let closed = regulated(&PHASES, speed).unwrap();
             let leads = (0..200).map(|k| PI * f64::from(k) / 200.0);
-            let most = leads.map(|lead| mean_torque(&PHASES, speed, lead, &mut 0.0)).fold(0.0, f64::max);
+            let half = HalfPeriod::new(&PHASES, speed);
+            let most = leads.map(|lead| mean_torque(&PHASES, half.as_ref(), lead, &mut 0.0)).fold(0.0, f64::max);
             assert!((closed / most - 1.0).abs() < 2e-4, "{speed} rad/s: {closed} N m, integrated {most} N m");
         }
     }
@@ -322,8 +315,8 @@ mod tests {
     fn at_the_highest_speeds_the_torque_is_largest_beyond_half_a_period() {
         let speed = 32e3 / 4.0 * 2.0 * PI / PHASES.teeth;
         let leads = (0..400).map(|k| 2.0 * PI * f64::from(k) / 400.0);
-        let mut current = 0.0;
-        let torques = leads.map(|lead| (lead, mean_torque(&PHASES, speed, lead, &mut current)));
+        let (half, mut current) = (HalfPeriod::new(&PHASES, speed), 0.0);
+        let torques = leads.map(|lead| (lead, mean_torque(&PHASES, half.as_ref(), lead, &mut current)));
         let (lead, most) = torques.max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         let found = torque(&PHASES, speed);
         assert!(lead > PI && (found / most - 1.0).abs() < 1e-3, "{found} N m, {most} N m at {lead} rad");

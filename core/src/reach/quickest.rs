@@ -7,7 +7,6 @@ use crate::design::{Bounds, Design};
 use crate::error::{Error, Result};
 use crate::golden;
 use crate::machine::{BeltModel, Machine};
-use crate::parameter;
 use crate::signal::arc::Arc;
 use crate::signal::profile::{Leg, Limits, Passage, Profile};
 
@@ -78,11 +77,10 @@ impl Wanted {
 }
 
 /// Largest acceleration, m/s², of a coordinate alone that steppers move to the end of its travel and back, accelerating
-/// over one half and braking over the other, within the pull-out torque at each speed less the usual reserve of a plan;
+/// over one half and braking over the other, within the pull-out torque at each speed less this `reserve`, from 0 to 1;
 /// at low speeds if its travel is not limited. Zero if there is none, `None` for other motors.
-pub fn within_pull_out(machine: &Machine, slide: usize) -> Option<f64> {
+pub fn within_pull_out(machine: &Machine, slide: usize, reserve: f64) -> Option<f64> {
     machine.stepper()?;
-    let allowed = 1.0 - parameter::default_of("move.plan.reserve")?;
     let travels: Vec<[f64; 2]> =
         machine.travels().map(|(_, travel)| travel.map_or([0.0, SHORT_WAY], |own| [own.min, own.max])).collect();
     let start: Vec<f64> = travels.iter().map(|[min, _]| *min).collect();
@@ -94,7 +92,7 @@ pub fn within_pull_out(machine: &Machine, slide: usize) -> Option<f64> {
         let legs = [Leg::To(there.clone(), limits), Leg::To(start.clone(), limits)];
         let Ok(profiles) = Profile::of_legs(&start, &legs) else { return false };
         let loads = loads(machine, Bounds::default(), &profiles);
-        loads.iter().filter(|load| load.limit == "pull_out").all(|load| load.share() <= allowed)
+        loads.iter().filter(|load| load.limit == "pull_out").all(|load| load.share() <= 1.0 - reserve)
     };
     let [mut low, mut high] = ACCELERATIONS;
     if !is_within(low) {

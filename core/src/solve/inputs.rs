@@ -32,6 +32,12 @@ impl Pieces {
         pieces
     }
 
+    /// These inputs with a constant added to each.
+    pub fn plus(mut self, added: &[f64]) -> Self {
+        self.coefficients.iter_mut().zip(added).for_each(|(coefficients, added)| coefficients[0] += added);
+        self
+    }
+
     /// These values, held from `start` to `end`; without an end unless `end` is after `start`.
     pub fn held(values: &[f64], start: f64, end: f64) -> Self {
         let end = if end > start { end } else { f64::INFINITY };

@@ -167,6 +167,20 @@ impl<'a> Run<'a> {
         self.advance(until)
     }
 
+    /// Follows these inputs, one for each drive, with a constant added to each, from now until `until`, s, or to the end
+    /// of the run; false if the run ended early.
+    pub fn hold_added(&mut self, inputs: &[Signal], added: &[f64], until: f64) -> bool {
+        loop {
+            let end = self.running.set_signals(inputs, added, self.time).min(until);
+            if !self.advance(end) {
+                return false;
+            }
+            if self.time >= until.min(self.end) {
+                return true;
+            }
+        }
+    }
+
     /// Advances to `until`, s, or to the end of the run; false if the run ended early.
     fn advance(&mut self, until: f64) -> bool {
         let goes_on = self.time >= self.end || self.running.advance(until);
@@ -204,7 +218,7 @@ impl<'a> Run<'a> {
     /// Runs to the end along these signals.
     pub(super) fn along(mut self, signals: &[Signal]) -> (Outcome, Known) {
         loop {
-            let until = self.running.set_signals(signals, self.time);
+            let until = self.running.set_signals(signals, &[], self.time);
             if self.time >= self.end || !self.advance(until) {
                 break;
             }

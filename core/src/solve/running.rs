@@ -27,9 +27,10 @@ pub(super) trait Running {
         pieces
     }
 
-    /// Sets the pieces of these signals from the present `time` on, and returns their end.
-    fn set_signals(&mut self, signals: &[Signal], time: f64) -> f64 {
-        let pieces = self.told(Pieces::new(signals, time));
+    /// Sets the pieces of these signals, with a constant added to each, from the present `time` on, and returns their
+    /// end.
+    fn set_signals(&mut self, signals: &[Signal], added: &[f64], time: f64) -> f64 {
+        let pieces = self.told(Pieces::new(signals, time).plus(added));
         self.set_input(&pieces);
         pieces.end
     }

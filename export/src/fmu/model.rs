@@ -102,6 +102,11 @@ impl Model {
         self.parameters.iter().map(|(free, _)| free.start).collect()
     }
 
+    /// The machine of the case.
+    pub fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
     /// Number of slides, each with its reference.
     pub fn slides(&self) -> usize {
         self.machine.geometry().slides.len()

@@ -39,7 +39,7 @@ void mexFunction(int nlhs, mxArray *plhs[], int nrhs, const mxArray *prhs[])
             input[i] = commands[k + (i * steps)];
         }
         if (@name@_plant_step(input) != @NAME@_PLANT_DONE) {
-            mexErrMsgTxt("the step has more events than it may have, or something left its travel");
+            mexErrMsgTxt("more events than a step may have, something left its travel, or a command jumps too far");
         }
         @name@_plant_read(&now);
         for (i = 0; i < @NAME@_PLANT_BODIES; i++) {

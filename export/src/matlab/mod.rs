@@ -16,14 +16,19 @@ const MEX: &str = include_str!("mex.c");
 /// The files `NAME.m`, `NAME_data.mat`, `NAME_mex.c`, and the C that belongs to it.
 pub(super) fn export(case: &Case, stem: &str, options: &Options) -> Result<Exported> {
     let name = identifier(stem);
-    let tables = Tables::new(&mechanism(case))?;
+    let tables = Tables::with_steppers(&mechanism(case))?;
     let step = options.step.unwrap_or(STEP);
+    let example = match tables.steppers.is_empty() {
+        true => "[0 5; 0.25 0], 1, 1e-3);      % 5 V for 0.25 s",
+        false => "[t, 0.05 * t], 1, 1e-3);      % 50 mm/s with t = (0:1e-3:1)'",
+    };
     let plain: String = case.title.as_str().chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
     let fill = |text: &str| {
         text.replace("@title@", &c::plain(&plain))
             .replace("@version@", env!("CARGO_PKG_VERSION"))
             .replace("@name@", &name)
             .replace("@leave@", &LEAVE.to_string())
+            .replace("@example@", example)
             .replace("@NAME@", &name.to_uppercase())
     };
     let plant = Options { part: Some(Part::Plant), real: Real::Double, step: Some(step), ..Options::default() };
@@ -81,6 +86,9 @@ fn variables(case: &Case, tables: &Tables, step: f64) -> Result<Vec<(&'static st
         ("body_places", rows(packed.bodies.iter().map(|row| row.to_vec()).collect())),
         ("lengths", Variable::Numbers(packed.lengths.iter().map(|row| row.to_vec()).collect())),
         ("outputs_first", whole(&packed.outputs)),
+        ("others_first", whole(&[packed.others])),
+        ("products", rows(packed.products.iter().map(|row| row.to_vec()).collect())),
+        ("steppers", Variable::Numbers(packed.steppers.iter().map(|row| row.to_vec()).collect())),
     ];
     let system = System::new(&case.machine, Operation::default())?;
     let matrix =

@@ -12,7 +12,7 @@ const SCRIPT: &str = include_str!("model.py");
 
 /// The file `STEM.py`.
 pub(super) fn export(case: &Case, stem: &str, options: &Options) -> Result<Exported> {
-    let tables = Tables::new(&mechanism(case))?;
+    let tables = Tables::with_steppers(&mechanism(case))?;
     let packed = Packed::new(&tables);
     let linear = linear(&case.machine)?;
     let mut text = SCRIPT.replace("@tables@", lists(&tables, &packed).trim_end()).replace("@linear@", &linear);
@@ -23,6 +23,8 @@ pub(super) fn export(case: &Case, stem: &str, options: &Options) -> Result<Expor
         ("@stem@", plain(stem)),
         ("@leave@", LEAVE.to_string()),
         ("@fastest@", format!("{:?}", tables.fastest)),
+        ("@example@", example(&tables).into()),
+        ("@about@", about(&tables).into()),
     ] {
         text = text.replace(place, &part);
     }
@@ -32,6 +34,23 @@ pub(super) fn export(case: &Case, stem: &str, options: &Options) -> Result<Expor
         ("needs".into(), "NumPy and SciPy; python-control for linear()".into()),
     ];
     Ok(Exported { files: vec![(format!("{stem}.py"), text.into_bytes())], facts, notes: Vec::new() })
+}
+
+/// Commands of an example.
+fn example(tables: &Tables) -> &'static str {
+    match tables.steppers.is_empty() {
+        true => "[(0.0, [5.0] * len(DRIVES)), (0.25, [0.0] * len(DRIVES))]",
+        // 1 s at 50 mm/s
+        false => "lambda time: [0.05 * min(time, 1.0)] * len(DRIVES)",
+    }
+}
+
+/// That example in words.
+fn about(tables: &Tables) -> &'static str {
+    match tables.steppers.is_empty() {
+        true => "[(0.0, 5.0), (0.25, 0.0)], until=1.0)     # 5 V for 0.25 s",
+        false => "lambda time: 0.05 * time, until=1.0)    # 50 mm/s, a command every ms",
+    }
 }
 
 /// A text as a string in three quotes can hold it.
@@ -55,7 +74,7 @@ fn lists(tables: &Tables, packed: &Packed) -> String {
     put("COMMAND_UNITS", "these", &units);
     let states: Vec<(&str, &str)> = tables.states.iter().map(|state| (state.name.as_str(), state.unit)).collect();
     put("STATES", "the states", &states);
-    put("WEIGHTS", "rows of weights on z = (states, commands, 1), each once", &packed.weights);
+    put("WEIGHTS", "rows of weights on z = (states, products, commands, 1), each once", &packed.weights);
     put("ENTRY", "for all entries of all tables: which row", &packed.entry);
     put("ENTRY_FIRST", "where the entries of a table begin", &packed.entry_first);
     put("DEPENDS", "the elements that choose among them, the last one changing fastest", &packed.depends);
@@ -72,6 +91,11 @@ fn lists(tables: &Tables, packed: &Packed) -> String {
     put("PLACES", "of each body: places of coordinate and speed, element of its motion", &packed.bodies);
     put("LENGTHS", "belt lengths in the places of angles: body, other body (-1 itself), arm", &packed.lengths);
     put("OUTPUTS", "first tables of currents, voltages and forces", &packed.outputs);
+    put("OTHERS", "first table of the second currents of steppers", &packed.others);
+    put("PRODUCTS", "products behind the states: places of their factors", &packed.products);
+    let steppers = "steppers: body of the rotor, place of its sine, electrical angle and angle per command, rad/m, \
+                    microstep (0 for none) and farthest jump, m, amplitudes of commanded phases and at rest, most there";
+    put("STEPPERS", steppers, &packed.steppers);
     text
 }
 

@@ -14,9 +14,9 @@ pub fn page(tried: &Tried, text: &str) -> (Page, Vec<(String, Picture)>) {
     let machine = &tried.case.machine;
     let mut pictures = Vec::new();
     let words = controller(tried.design, machine);
-    let mut page = Page::new(tried.case.title.clone()).subtitle(match machine.stepper() {
-        Some(_) => format!("Moves in {words}."),
-        None => format!("Moves in closed loop: {words}."),
+    let mut page = Page::new(tried.case.title.clone()).subtitle(match tried.design.is_open_loop() {
+        true => format!("Moves in {words}."),
+        false => format!("Moves in closed loop: {words}."),
     });
     page.section("The machine");
     drawn(&mut page, machine);

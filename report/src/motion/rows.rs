@@ -41,7 +41,9 @@ pub fn controller(design: &Design, machine: &Machine) -> String {
     }
     if let Some(stepper) = machine.stepper() {
         words.push(if stepper.interpolate { "commanded" } else { "commanded in microsteps" }.into());
-        return words.join(", ");
+        if design.is_open_loop() {
+            return words.join(", ");
+        }
     }
     let timing = format!("every {}", time(design.every));
     words.push(if design.delay > 0.0 { format!("{timing}, delay {}", time(design.delay)) } else { timing });
@@ -95,7 +97,7 @@ pub fn lines(tried: &Tried, done: &Done) -> Vec<(&'static str, String)> {
         ("peak force", format!("{} in {} at {}", value(force.value, "N"), span(force_place), time(force.time))),
         ("current", of_drives(&|drive| largest(drive.current, "A"))),
     ];
-    let accuracy = ("accuracy", accuracy(&run.outcome, Accuracy::basis(machine)));
+    let accuracy = ("accuracy", accuracy(&run.outcome, Accuracy::basis(machine, run)));
     // A stepper has no samples, and its phases have voltages of their own.
     match lost_steps(&run.metrics, geometry) {
         Some(lost) => lines.extend([accuracy, ("lost steps", lost)]),

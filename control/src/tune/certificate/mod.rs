@@ -80,6 +80,9 @@ impl Certificate {
     /// ends it early.
     pub fn new(family: &Family, design: &Design, limits: [f64; 2], stop: &dyn Fn() -> bool) -> Result<Self> {
         let feedback = Feedback::new(design, &family.machine)?;
+        if family.machine.stepper().is_some() {
+            return Ok(Self::none("the field of a stepper is not covered"));
+        }
         if family.machine.drives.len() > 1 {
             return Ok(Self::none("several drives are not covered"));
         }
