@@ -97,10 +97,10 @@ impl<'a, T: AtInstant> Course<'a, T> {
     /// taken where the motion has one.
     fn margin(&self, time: f64, length: f64) -> f64 {
         let inside = INSIDE * length.abs();
-        let leaving = (self.at)(time + INSIDE * length).motions().into_iter().filter_map(|[speed, acceleration]| {
-            (speed.abs() <= REST_SPEED && acceleration.abs() > REST_ACCELERATION)
-                .then(|| 2.0 * REST_SPEED / acceleration.abs())
-        });
+        let motions = (self.at)(time + INSIDE * length).motions();
+        let leaving = (motions.into_iter())
+            .filter(|[speed, acceleration]| speed.abs() <= REST_SPEED && acceleration.abs() > REST_ACCELERATION)
+            .map(|[_, acceleration]| 2.0 * REST_SPEED / acceleration.abs());
         leaving.fold(inside, f64::max).min(0.25 * length.abs())
     }
 
