@@ -24,6 +24,9 @@ const PERIODS: [[u8; 2]; 7] = [[0, 0], [1, 0], [2, 0], [3, 0], [6, 0], [10, 0], 
 /// Fractions of the limits that plans use, the quickest first.
 const SHARES: [f64; 8] = [1.0, 0.85, 0.72, 0.6, 0.5, 0.4, 0.3, 0.2];
 
+/// Number of fractions tried between that of the first plan to arrive and the next larger one.
+const NARROWED: usize = 4;
+
 /// Maximum number of times that a plan is slowed down because its run exceeds a limit of the belt, and the fraction of
 /// the limit that the next one aims at.
 const SLOWED: usize = 5;
@@ -302,7 +305,7 @@ impl Planner<'_> {
     fn tried(&self, search: &Search) -> Result<(Vec<Tried>, Option<Shortfall>)> {
         let (mut tried, mut refused) = (Vec::new(), None);
         let machine = self.family.machine.interpolating();
-        let solver = roughly(&machine, search.motion);
+        let runs = (&machine, roughly(&machine, search.motion));
         for periods in PERIODS {
             let mut seen: Vec<Limits> = Vec::new();
             for share in SHARES {
@@ -316,16 +319,53 @@ impl Planner<'_> {
                     continue;
                 }
                 seen.push(limits);
-                match self.slowed(search, periods, share, limits, (&machine, solver))? {
-                    Ok((limits, ran)) => {
-                        let duration = Profile::last_end(&search.way.within(&limits)?);
-                        tried.push(Tried { limits, periods, share, arrival: Arrival::new(duration, &ran) });
-                    }
+                match self.tried_at(search, periods, share, limits, runs)? {
+                    Ok(one) => tried.push(one),
                     Err(short) => refused = Some(short),
                 }
             }
         }
+        self.narrow(search, &mut tried, runs)?;
         Ok((tried, refused))
+    }
+
+    /// Plan within these limits or slower ones, with its arrival on this machine by this solver, or what its run exceeds.
+    fn tried_at(
+        &self,
+        search: &Search,
+        periods: [u8; 2],
+        share: f64,
+        limits: Limits,
+        runs: (&Machine, Solver),
+    ) -> Result<std::result::Result<Tried, Shortfall>> {
+        let (limits, ran) = match self.slowed(search, periods, share, limits, runs)? {
+            Ok(slowed) => slowed,
+            Err(short) => return Ok(Err(short)),
+        };
+        let duration = Profile::last_end(&search.way.within(&limits)?);
+        Ok(Ok(Tried { limits, periods, share, arrival: Arrival::new(duration, &ran) }))
+    }
+
+    /// Adds plans by bisection between the fraction of the first to arrive and the next larger one, at which the cart
+    /// leaves its window once more.
+    fn narrow(&self, search: &Search, tried: &mut Vec<Tried>, runs: (&Machine, Solver)) -> Result<()> {
+        let Some(mut best) = tried.iter().min_by(|a, b| a.rank().total_cmp(&b.rank())).cloned() else { return Ok(()) };
+        let Some(mut above) = SHARES.into_iter().rev().find(|share| *share > best.share) else { return Ok(()) };
+        for _ in 0..NARROWED {
+            let share = 0.5 * (best.share + above);
+            let Some(limits) = self.limits(search, best.periods, Share { motor: share, ..Share::ALL })? else { break };
+            if (self.stop)() || tried.iter().any(|one| one.limits == limits) {
+                break;
+            }
+            let Ok(one) = self.tried_at(search, best.periods, share, limits, runs)? else { break };
+            if one.rank() < best.rank() {
+                best = one.clone()
+            } else {
+                above = share
+            }
+            tried.push(one);
+        }
+        Ok(())
     }
 
     /// Limits of the quickest move within these fractions of the limits, and within those of the family.
