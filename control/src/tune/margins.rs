@@ -511,7 +511,7 @@ mod tests {
         let (peaks, margins) = (Peaks::new(&plant, &feedback), Margins::new(&plant, &feedback));
         assert!(peaks.is_stable() && margins.stable);
         assert_eq!(peaks.peaks, [margins.sensitivity, margins.complementary]);
-        let (plant, feedback) = read("60 ms");
+        let (plant, feedback) = read("20 ms");
         assert!(!Peaks::new(&plant, &feedback).is_stable() && !Margins::new(&plant, &feedback).stable);
     }
 

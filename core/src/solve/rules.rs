@@ -373,6 +373,27 @@ pub(super) fn note_tie<B: Between>(solver: &mut B, body: usize) {
 mod tests {
     use super::*;
 
+    /// Events that were passed on count towards the limit of a run.
+    #[test]
+    fn events_that_were_handed_on_are_counted() {
+        let mut rules = Rules::new(Mode::new(std::iter::empty()));
+        let label = crate::mechanism::Label { key: "part", name: "part" };
+        let event = Event {
+            time: 0.0,
+            part: Part { what: What::Body(0), label },
+            from: Status::Motion(Motion::Stuck),
+            to: Status::Motion(Motion::Forward),
+            load: 0.0,
+            by_rounding: false,
+        };
+        let mut all = Vec::new();
+        for count in [2, 3] {
+            rules.events.extend(std::iter::repeat_n(event, count));
+            rules.hand_on(&mut all);
+        }
+        assert_eq!((rules.handed_on, all.len(), rules.events.len()), (5, 5, 0));
+    }
+
     #[test]
     fn a_condition_that_has_changed_is_zero_to_its_order_until_it_is_refreshed() {
         let mut rules = Rules::new(Mode::new(std::iter::empty()));

@@ -184,7 +184,10 @@ fn tell(trials: &[Trial], tests: &[Test]) {
         let of_area: Vec<&Trial> = trials.iter().filter(|trial| trial.change.file.starts_with(area)).collect();
         let noticed = of_area.iter().filter(|trial| trial.noticed.is_some()).count();
         let endless = of_area.iter().filter(|trial| matches!(trial.noticed, Some((Ended::Not, _)))).count();
-        let unreached = of_area.iter().filter(|trial| trial.noticed.is_none() && trial.passed.is_empty() && reaching(trial) == 0).count();
+        let unreached = of_area
+            .iter()
+            .filter(|trial| trial.noticed.is_none() && trial.passed.is_empty() && reaching(trial) == 0)
+            .count();
         if !of_area.is_empty() {
             let (name, tried) = (if area.is_empty() { "all" } else { area }, of_area.len());
             let share = 100.0 * noticed as f64 / tried as f64;

@@ -378,3 +378,30 @@ impl Balance {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::TEMPLATE;
+
+    /// An output at the end of its range is an end stop, if the machine has one; an input is none.
+    #[test]
+    fn saturation_is_a_warning_unless_a_stop_explains_it() {
+        let graded = |changes: &[&str], column: &'static str| {
+            let case = Case::from_text_with("axis.toml", TEMPLATE, changes).unwrap();
+            let note = Note {
+                code: "saturation",
+                severity: Severity::Warning,
+                column: Some(column),
+                text: String::new(),
+                remedy: None,
+            };
+            grade(&note, &case, &Plan::default())
+        };
+        let stops = ["travel={ min = \"-0.2 m\", max = \"0.2 m\" }"];
+        assert!(graded(&[], "cart_position") == Grade::Warning);
+        assert!(graded(&[], "input") == Grade::Warning);
+        assert!(graded(&stops, "cart_position") == Grade::Note);
+        assert!(graded(&stops, "input") == Grade::Warning);
+    }
+}
