@@ -91,7 +91,7 @@ pub fn within_pull_out(machine: &Machine, slide: usize, reserve: f64) -> Option<
         let limits = Limits { speed: (acceleration * way).sqrt(), acceleration, jerk: None, snap: None };
         let legs = [Leg::To(there.clone(), limits), Leg::To(start.clone(), limits)];
         let Ok(profiles) = Profile::of_legs(&start, &legs) else { return false };
-        let loads = loads(machine, Bounds::default(), &profiles, INSTANTS);
+        let loads = loads(machine, Bounds::default(), &profiles, CLOSELY);
         loads.iter().filter(|load| load.limit == "pull_out").all(|load| load.share() <= 1.0 - reserve)
     };
     let [mut low, mut high] = ACCELERATIONS;
