@@ -19,7 +19,7 @@ use taut::reach::quickest::within_pull_out;
 use taut::solve::{Ending, Flow, Solver, simulate};
 use taut::trajectory::{CsvWriter, Trajectory};
 use taut::tune::trouble::trouble;
-use taut::tune::{Margins, Plant, evaluate, tune};
+use taut::tune::{Margins, Plant, tune};
 
 /// Step of the integration, s.
 const STEP: f64 = 1e-6;
@@ -996,11 +996,9 @@ fn the_gains_of_a_stepper_with_an_encoder_are_tuned() {
     let gains = "pid = { proportional = 0.05, integral = 5, derivative = 1e-4, filter = 800 }";
     let case = corrected(gains, 2.0, (0.2, 2.0), &[]);
     let tuning = taut::case::Tuning { spread: Some(0.1), effort: 0.1, ..Default::default() };
-    let before = evaluate(&case, &tuning).unwrap();
-    assert!(before.after.nominal.stable && before.holds);
     let tuned = tune(&case, &tuning, &|| false).unwrap();
-    let [was, is] = [&tuned.before, &tuned.after].map(|verdict| verdict.objective);
-    assert!(tuned.holds && is < was, "{is}, before {was}");
+    // The gains of the file let the cart swing on its belt.
+    assert!(tuned.before.nominal.stable && tuned.before.worst.sensitivity > 1.8 && tuned.holds);
     assert!(tuned.after.worst.sensitivity <= 1.8 && tuned.after.worst.complementary <= 1.8);
     let text = tuned.case_text(&case, std::path::Path::new("tuned.toml")).unwrap();
     assert!(text.contains(" 1/s\""), "{text}");

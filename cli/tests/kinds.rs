@@ -30,7 +30,7 @@ const WITH_LOGS: [&str; 2] = ["stages/h-frame/belts.toml", "stages/core-xy/belts
 const STEPPERS: [&str; 2] = ["stages/stepper-axis/stepper-axis.toml", "stages/printer-core-xy/printer.toml"];
 
 /// Commands that take a stepper; all others refuse it.
-const WITH_STEPPER: [&str; 15] = [
+const WITH_STEPPER: [&str; 14] = [
     "show",
     "simulate",
     "modes",
@@ -45,7 +45,6 @@ const WITH_STEPPER: [&str; 15] = [
     "export fmu",
     "export matlab",
     "export python",
-    "learn",
 ];
 
 /// A stepper without feedback, where a controller is needed.

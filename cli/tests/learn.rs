@@ -62,7 +62,11 @@ fn what_cannot_be_learned_is_told() {
         ([&usual[..], &["--position", "nowhere"]].concat(), 2, "nowhere"),
         ([&usual[..], &["--unit", "V"]].concat(), 2, "a unit of length is needed"),
         ([&usual[..], &["--added", &log]].concat(), 2, "added_V"),
-        ([&usual[..], &["--set", "controller.pid.proportional=300 V/mm"]].concat(), 1, "pid-shaped.toml: the loop is not stable"),
+        (
+            [&usual[..], &["--set", "controller.pid.proportional=300 V/mm"]].concat(),
+            1,
+            "pid-shaped.toml: the loop is not stable",
+        ),
         (square.to_vec(), 2, "bridge_position_m"),
         (
             [&square[..], &["--position", "cart_position_m"]].concat(),

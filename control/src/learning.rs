@@ -224,6 +224,7 @@ fn learned<const M: usize>(
     before: Option<&[Added]>,
     stop: &dyn Fn() -> bool,
 ) -> Result<Learned> {
+    crate::case::needs_motors(&case.machine)?;
     let Some(design) = &case.controller else {
         return Err(Error::new("there is no controller whose moves could be learned").next("add [controller]"));
     };

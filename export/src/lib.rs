@@ -24,7 +24,8 @@ pub use tables::{Does, Element, ElementKind, Row, StateName, TableGuard, Tables,
 
 use crate::case::Case;
 use crate::error::{Error, Result};
-use crate::linear::{Operation, placed, within_travel};
+use crate::linear::{Operation, System, placed, within_travel};
+use crate::machine::Machine;
 use crate::number::engineering_typed;
 use std::borrow::Cow;
 
@@ -238,6 +239,16 @@ pub fn export(case: &Case, target: Target, stem: &str, options: &Options) -> Res
     }?;
     exported.notes.extend(note);
     Ok(exported)
+}
+
+/// The linear model with everything sliding at its usual speed; steppers whose supply does not suffice for that are at
+/// rest on a full step.
+fn linear(machine: &Machine) -> Result<System> {
+    let usual = Operation::default();
+    System::new(machine, usual).or_else(|error| match machine.stepper() {
+        Some(_) => System::new(machine, Operation { speed: 0.0, ..usual }),
+        None => Err(error),
+    })
 }
 
 /// The case with spans that do not follow cart and bridge but are as they are at a place, and a note that says so.

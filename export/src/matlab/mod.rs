@@ -7,7 +7,6 @@ use super::packed::{LEAVE, Packed};
 use super::{Exported, Options, Part, Real, STEP, Tables, c, identifier, mechanism};
 use crate::case::Case;
 use crate::error::Result;
-use crate::linear::{Operation, System};
 use mat::Variable;
 
 const FUNCTION: &str = include_str!("model.m");
@@ -90,7 +89,7 @@ fn variables(case: &Case, tables: &Tables, step: f64) -> Result<Vec<(&'static st
         ("products", rows(packed.products.iter().map(|row| row.to_vec()).collect())),
         ("steppers", Variable::Numbers(packed.steppers.iter().map(|row| row.to_vec()).collect())),
     ];
-    let system = System::new(&case.machine, Operation::default())?;
+    let system = super::linear(&case.machine)?;
     let matrix =
         |m: &nalgebra::DMatrix<f64>| Variable::Numbers(m.row_iter().map(|row| row.iter().copied().collect()).collect());
     all.extend([

@@ -4,7 +4,7 @@ use super::packed::{LEAVE, Packed};
 use super::{Exported, Options, STEP, Tables, mechanism};
 use crate::case::Case;
 use crate::error::Result;
-use crate::linear::{Operation, System, Variable};
+use crate::linear::Variable;
 use crate::machine::Machine;
 use std::fmt::{Debug, Write};
 
@@ -100,7 +100,7 @@ fn lists(tables: &Tables, packed: &Packed) -> String {
 }
 
 fn linear(machine: &Machine) -> Result<String> {
-    let system = System::new(machine, Operation::default())?;
+    let system = super::linear(machine)?;
     let rows = |m: &nalgebra::DMatrix<f64>| -> Vec<Vec<f64>> {
         m.row_iter().map(|row| row.iter().copied().collect()).collect()
     };
