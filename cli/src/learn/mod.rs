@@ -44,7 +44,7 @@ pub fn run(args: &Args) -> Outcome {
         positions.push(position.into_iter().map(|value| value * args.unit).collect());
     }
     let trial = Trial { time, positions, at };
-    trial.check(&case.machine, motion, &design).map_err(|error| error.in_file(log))?;
+    trial.check(&case.machine, motion, design).map_err(|error| error.in_file(log))?;
     let unit = case.machine.drives[0].amplifier.mode.unit();
     let before = args.added.as_deref().map(|file| folder::read_added(file, &case.machine)).transpose()?;
     let interrupt = Interrupt::listen();

@@ -228,11 +228,11 @@ fn drawn_machines_go_in_python_and_octave_where_taut_has_them() {
         let own = ways(&case, &solution);
         let behind: Vec<i64> = (0..case.machine.drives.len())
             .map(|drive| {
-                let slips = solution.outcome.events.iter().filter_map(|event| match (event.part.what, event.to) {
+                let mut slips = solution.outcome.events.iter().filter_map(|event| match (event.part.what, event.to) {
                     (What::Field(own), Status::Slipped(pitches)) if own == drive => Some(4 * i64::from(pitches)),
                     _ => None,
                 });
-                slips.last().unwrap_or(0)
+                slips.next_back().unwrap_or(0)
             })
             .collect();
         let compare = |tool: &str, folder: &TempDir, told: &str| {
