@@ -1099,17 +1099,13 @@ pub(crate) const STARTS_FITTED: usize = 3;
 /// Starts of elements of a machine of several coordinates that take steps, in the order of their predicted costs.
 ///
 /// Unit: starts. Source: chosen: bounds the time. Test: `a_missing_element_of_a_gantry_is_named`.
-pub(crate) const CAUSES_STEPPED: usize = 10;
-
-/// Most parts of a machine on which one element takes them.
-///
-/// Unit: starts. Source: chosen.
-pub(crate) const STARTS_STEPPED: usize = 3;
+pub(crate) const CAUSES_STEPPED: usize = 16;
 
 /// Predicted cost of an element, relative to that of one that leaves noise, up to which it is fitted, too.
 ///
-/// Unit: 1. Source: chosen: a likelihood of six standard errors on some 700 values.
-pub(crate) const CAUSE_RIVAL: f64 = 1.05;
+/// Unit: 1. Source: chosen: predictions of elements as large as those of drives are off by some ten per cent. Test:
+/// `a_wrong_number_of_one_drive_is_named`.
+pub(crate) const CAUSE_RIVAL: f64 = 2.0;
 
 /// Share of the squared residuals that an element must explain.
 ///
@@ -1204,6 +1200,11 @@ pub(crate) const SENSOR_START: f64 = 0.2887;
 ///
 /// Unit: intervals between samples. Source: chosen: one of either sign.
 pub(crate) const CAUSE_DELAYS: [f64; 2] = [0.5, -0.5];
+
+/// Delays from which elements of gantries begin in windows, where either leads to either sign.
+///
+/// Unit: as there. Source: chosen. Test: `a_delay_of_the_inputs_of_a_gantry_is_named`.
+pub(crate) const WINDOW_DELAYS: [f64; 2] = [0.5, 2.0];
 
 /// Limits of the amplifier that are tried.
 ///

@@ -420,11 +420,16 @@ pub(crate) struct InWindows<'a> {
     pub noise: Vec<(Quantity, f64)>,
 }
 
-/// The end of a rough search in the shorter ones of these windows, in which a wrong model stays in step with the logs.
-/// `None` if it fails.
-pub(crate) fn end_in_windows<'a>(case: &Case, plan: &Plan, problem: &Problem<'a>) -> Option<InWindows<'a>> {
+/// The end of a rough search from `start` in the shorter ones of these windows, in which a wrong model stays in step with
+/// the logs. `None` if it fails.
+pub(crate) fn end_in_windows<'a>(
+    case: &Case,
+    plan: &Plan,
+    problem: &Problem<'a>,
+    start: &[f64],
+) -> Option<InWindows<'a>> {
     let [short, plan, _] = START_WINDOWS.map(|samples| windowed(plan, problem, samples));
-    let (mut guess, globals) = (problem.start(), problem.globals());
+    let (mut guess, globals) = (start.to_vec(), problem.globals());
     improve(case, &short, &mut problem.clone(), &mut guess, &mut roughly).ok().filter(|is_good| *is_good)?;
     let mut problem = Problem::new(case, &plan).ok()?.stopped_by(problem.stop());
     let mut start = problem.start();

@@ -157,7 +157,8 @@ impl<'s, 'a> Site<'s, 'a> {
 
     /// The fit without the element in short windows, in which elements of this fit begin; `None` if it fails.
     pub fn windows(&self) -> Option<&InWindows<'a>> {
-        self.windows.get_or_init(|| end_in_windows(self.case, self.plan, &self.found.problem)).as_ref()
+        let problem = &self.found.problem;
+        self.windows.get_or_init(|| end_in_windows(self.case, self.plan, problem, &problem.start())).as_ref()
     }
 
     /// The machine with which elements begin.

@@ -14,8 +14,8 @@
 //!
 //! On a machine of several coordinates, each drive, sensor or slide may have an element: the linear model predicts the
 //! costs of all, and only those with the least take steps. Such a machine swings out of step with a log that a wrong
-//! model cannot follow, and its fit ends anywhere. Where it does not end within the noise, elements are ranked and begin
-//! in short windows, from a fit with the values of the case, until one leaves noise.
+//! model cannot follow, and its fit ends anywhere. Where it does not end within the noise, elements are ranked in short
+//! windows, and begin with the values of the case and a search in windows, as the fit itself did, until one leaves noise.
 
 mod amplifier;
 mod apart;
@@ -36,7 +36,7 @@ use crate::case::{Case, Plan};
 use crate::fit::asked::run::FittedLog;
 use crate::fit::limits::{
     CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_RIVAL, CAUSES_FITTED, CAUSES_STEPPED, COLOURED,
-    HELD_OUT_SHOWS, NORMAL, SAME_MINIMUM, STARTS_FITTED, STARTS_STEPPED,
+    HELD_OUT_SHOWS, NORMAL, SAME_MINIMUM, STARTS_FITTED,
 };
 use crate::fit::search::starts::{Effort, Searched, is_noise};
 use crate::machine::Machine;
@@ -171,8 +171,7 @@ fn begun<'a>(site: &Site<'_, 'a>, is_curved: bool, goal: f64) -> Vec<Tried<'a>> 
 }
 
 /// Starts of all elements, in the order of the table. Machines of several coordinates have many parts that may have an
-/// element: of these starts, those with the least predicted costs, the least first, one for each part, and not many of
-/// one element.
+/// element: of these starts, those with the least predicted costs, the least first, one for each part.
 fn starts(site: &Site, is_curved: bool) -> Vec<Start> {
     let is_ranked = !site.machine.has_one_coordinate();
     let rows = EXTENSIONS.iter().filter(|row| row.is_curved == is_curved && row.on.takes(&site.machine));
@@ -183,9 +182,7 @@ fn starts(site: &Site, is_curved: bool) -> Vec<Start> {
         starts.sort_by(|a, b| a.promised.total_cmp(&b.promised));
         let mut taken: Vec<Start> = Vec::new();
         for start in starts {
-            let is_new = taken.iter().all(|other| other.kind() != start.kind());
-            let alike = taken.iter().filter(|other| other.kind().0 == start.kind().0).count();
-            if is_new && alike < STARTS_STEPPED {
+            if taken.iter().all(|other| other.kind() != start.kind()) {
                 taken.push(start);
             }
         }

@@ -5,7 +5,7 @@ use crate::case::{Plan, Scope};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::asked::run::Nuisance;
-use crate::fit::limits::{CAUSE_DELAYS, CAUSE_ERRORS};
+use crate::fit::limits::{CAUSE_DELAYS, CAUSE_ERRORS, WINDOW_DELAYS};
 use crate::fit::search::regression::suspected_delay;
 
 /// Inputs that act late, or samples that are taken later than their stamps.
@@ -17,9 +17,7 @@ pub(super) fn delays(site: &Site) -> Vec<Extended> {
     plan.nuisance.delay = Scope::Shared;
     let interval = site.found.problem.runs[0].interval();
     let suspected = suspected_delay(&site.found.problem);
-    // In windows one start leads to either sign.
-    let tried = if site.is_anew { &CAUSE_DELAYS[..1] } else { &CAUSE_DELAYS[..] };
-    let starts = tried.iter().map(|share| share * interval).chain(suspected);
+    let starts = begins(site).iter().map(|share| share * interval).chain(suspected);
     starts.map(|delay| with(site, &plan, None, delay)).collect()
 }
 
@@ -28,13 +26,18 @@ pub(super) fn drive_delays(site: &Site) -> Vec<Extended> {
     if site.plan.nuisance.delay != Scope::Off || site.plan.nuisance.drive_delay.is_some() {
         return Vec::new();
     }
-    let start = CAUSE_DELAYS[0] * site.found.problem.runs[0].interval();
+    let interval = site.found.problem.runs[0].interval();
     let of = |drive: usize| {
         let mut plan = site.plan.clone();
         plan.nuisance.drive_delay = Some(drive);
-        with(site, &plan, Some(drive), start)
+        begins(site).iter().map(move |share| with(site, &plan, Some(drive), share * interval))
     };
-    (0..site.machine.drives.len()).map(of).collect()
+    (0..site.machine.drives.len()).flat_map(of).collect()
+}
+
+/// Delays that are tried, in intervals between samples.
+fn begins(site: &Site) -> &'static [f64] {
+    if site.is_anew { &WINDOW_DELAYS } else { &CAUSE_DELAYS }
 }
 
 /// The case with this delay of one drive, or of all.

@@ -8,11 +8,11 @@ use crate::fit::asked::residuals::Residuals;
 use crate::fit::asked::run::{Extra, Nuisance};
 use crate::fit::limits::{
     CAUSE_ALIKE, CAUSE_DIFFERENCE, CAUSE_EXPLAINS, CAUSE_MOST_STEPS, CAUSE_REACH, CAUSE_SLOW, CAUSE_SLOW_STEPS,
-    CAUSE_STEPS, COLOURED, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS, TRIAL_ITERATIONS,
+    CAUSE_STEPS, COLOURED, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS,
 };
 use crate::fit::search::least_squares::{minimise, resume};
 use crate::fit::search::point::{Ending, Minimum, Options};
-use crate::fit::search::starts::{is_noise, times_noise};
+use crate::fit::search::starts::{end_in_windows, is_noise, times_noise};
 use crate::fit::trust::doubts::{Cause, Size};
 use crate::fit::trust::uncertainty::Judged;
 use crate::machine::Machine;
@@ -100,19 +100,12 @@ impl<'a> Tried<'a> {
     /// linear model at the start shows that they will not fall below `goal`.
     pub fn begun(site: &Site<'_, 'a>, start: Start, goal: f64) -> Option<Self> {
         let Start { row, extended, .. } = start;
-        let in_windows = match site.is_anew {
-            true => {
-                let (mut problem, begun) = in_windows(site, &extended)?;
-                let found = descend(&mut problem, begun, TRIAL_ITERATIONS, f64::INFINITY)?;
-                Some(found.x[..problem.globals()].to_vec())
-            }
-            false => None,
-        };
         let mut begun = Self::from(site, row, extended, (&site.found.problem, &site.found.best.x))?;
-        if let Some(globals) = in_windows {
-            let Self { problem, best, .. } = &mut begun;
-            let mut start = problem.start();
-            start[..globals.len()].copy_from_slice(&globals);
+        if site.is_anew {
+            let Self { extended: Extended { case, plan, .. }, problem, best, .. } = &mut begun;
+            let windows = end_in_windows(case, plan, problem, &best.x)?;
+            let (mut start, globals) = (best.x.clone(), problem.globals());
+            start[..globals].copy_from_slice(&windows.x[..globals]);
             let bounds = problem.bounds();
             *best = Minimum::linearised(problem, &start, &bounds)?;
         }
