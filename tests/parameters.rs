@@ -75,11 +75,15 @@ inertia = 0.5
 friction = { LAW }
 [bridge]
 mass = 4
+load = 0.5
+force_by_speed = [[-1, 0.25], [2, -0.5]]
 friction = { LAW }
 travel = { min = -2, max = 8, stop_stiffness = 512, stop_damping = 4 }
 yaw = { inertia = 0.5, belt_spacing = 4, bearing_spacing = 0.25, bearing_stiffness = 1048576, bearing_damping = 64 }
 [cart]
 mass = 2
+load = 0.5
+force_by_speed = [[-1, 0.25], [2, -0.5]]
 friction = { LAW }
 travel = { min = -1, max = 4, stop_stiffness = 256, stop_damping = 2 }
 [belt]

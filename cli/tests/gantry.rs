@@ -339,7 +339,7 @@ fn a_sweep_that_a_gantry_cannot_have_is_told() {
             "idler_pulley.inertia=20%",
             "sweep.vary.idler_pulley.inertia: `idler_pulley.inertia` is of a single axis, and this is a gantry\n",
         ),
-        ("cart.load=20%", "`cart.load` is not a parameter of the machine\n"),
+        ("cart.load=20%", "`cart.load` is 0, of which a share or a multiple is nothing\n"),
         ("sweep.runs=20%", "`sweep.runs` is not a number of the machine\n"),
         ("third_drive.motor.resistance=20%", "`third_drive.motor.resistance` is not a parameter of the machine\n"),
         ("left_drive.cart.mass=20%", "`left_drive.cart.mass` is not a parameter of the machine\n"),
