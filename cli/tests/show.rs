@@ -108,9 +108,9 @@ fn the_template_of_a_printer_has_a_stepper_and_goes_through_its_commands() {
     for command in ["simulate", "move", "shape"] {
         taut_in(root()).args([command, file, "--quiet"]).assert().success();
     }
-    // Its loop is open, and learned signals are voltages or currents.
-    let added = ["move", "--move", "80 mm", "--added", "learned.csv"];
-    for (command, words) in [(&["tune"][..], "has no gains to tune"), (&added, "this needs a motor")] {
+    // Its loop is open, and its repetitions are not learned from.
+    let learn = ["learn", "--move", "80 mm", "--log", "trial.csv"];
+    for (command, words) in [(&["tune"][..], "has no gains to tune"), (&learn, "this needs a motor")] {
         let refused = taut(&[command, &[file]].concat());
         let said = String::from_utf8(refused.stderr).unwrap();
         assert!(refused.status.code() == Some(2) && said.contains(words), "{said}");

@@ -40,8 +40,8 @@ use std::sync::Arc;
 
 /// Maximum number of bodies.
 pub const BODIES: usize = 6;
-/// Maximum number of springs.
-pub(crate) const SPRINGS: usize = 9;
+/// Maximum number of springs: six spans, the bearings of a yaw, and two ends and two lines of forces of the slides.
+pub(crate) const SPRINGS: usize = 11;
 /// Maximum number of drives.
 pub const DRIVES: usize = 3;
 /// Maximum of both together for the exact solver: three drives allow one body less than two drives.
