@@ -546,6 +546,18 @@ fn for_each(count: u64, threads: u64, work: impl Fn(u64) + Sync) {
     });
 }
 
+/// True if a row with this name is asked for; without words, each is.
+fn is_asked(only: &[String], name: &str) -> bool {
+    only.is_empty() || only.iter().any(|words| name.contains(words.as_str()))
+}
+
+/// Findings of this work on many machines, each with a seed of its own, on several threads.
+fn summed<S: Default + Send>(machines: u64, seed: u64, threads: u64, work: impl Fn(u64, &Mutex<S>) + Sync) -> S {
+    let sum = Mutex::new(S::default());
+    for_each(machines, threads, |k| work(seed.wrapping_mul(1_000_003) + k, &sum));
+    sum.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner())
+}
+
 /// The table of causes.
 fn causes(machines: u64, seed: u64, threads: u64, (only, is_told): (&[String], bool)) {
     println!(
@@ -553,12 +565,10 @@ fn causes(machines: u64, seed: u64, threads: u64, (only, is_told): (&[String], b
     );
     println!("|---|---|---|---|---|---|---|---|---|---|");
     for truth in Truth::ALL {
-        if !only.is_empty() && !only.iter().any(|words| truth.name().contains(words.as_str())) {
+        if !is_asked(only, truth.name()) {
             continue;
         }
-        let sum = Mutex::new(Named::default());
-        for_each(machines, threads, |k| named(truth, seed.wrapping_mul(1_000_003) + k, is_told, &sum));
-        let mut sum = sum.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let mut sum: Named = summed(machines, seed, threads, |seed, sum| named(truth, seed, is_told, sum));
         sum.wide.sort_by(f64::total_cmp);
         let share = |count: usize| format!("{:.0} %", 100.0 * count as f64 / sum.machines.max(1) as f64);
         let wide = sum.wide.get(sum.wide.len() / 2).copied().unwrap_or(f64::NAN);
@@ -631,12 +641,10 @@ fn causes_of_gantries(machines: u64, seed: u64, threads: u64, (only, is_told): (
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     for lacks in Lacks::ALL {
-        if !only.is_empty() && !only.iter().any(|words| lacks.name().contains(words.as_str())) {
+        if !is_asked(only, lacks.name()) {
             continue;
         }
-        let sum = Mutex::new(OfGantries::default());
-        for_each(machines, threads, |k| of_gantry(lacks, seed.wrapping_mul(1_000_003) + k, is_told, &sum));
-        let sum = sum.into_inner().unwrap_or_else(|poisoned| poisoned.into_inner());
+        let sum: OfGantries = summed(machines, seed, threads, |seed, sum| of_gantry(lacks, seed, is_told, sum));
         let OfGantries { machines, right, elsewhere, wrong, alike, warned, held: [held, all], safe } = sum;
         println!(
             "| {} | {machines} | {right} | {elsewhere} | {wrong} | {alike} | {warned} | {held} of {all} | {:.0} % |",
@@ -682,7 +690,7 @@ fn main() -> ExitCode {
     println!("| disturbance; log | viscous | Coulomb | mass | force | half-width | without an interval |");
     println!("|---|---|---|---|---|---|---|");
     for (place, cell) in CELLS.iter().enumerate() {
-        if !only.is_empty() && !only.iter().any(|words| cell.name.contains(words.as_str())) {
+        if !is_asked(&only, cell.name) {
             continue;
         }
         let found = Mutex::new(CellResults::default());

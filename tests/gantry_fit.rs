@@ -479,8 +479,8 @@ fn a_dual_belt_is_fitted_with_the_logs_of_three_motors() {
     assert_eq!(found.estimates.len(), 7);
 }
 
-/// Every quantity that a log of a dual belt can have, alone with the encoders and all together: a scale at bridge or cart,
-/// a camera, an accelerometer at the cart, tachometers, currents and voltages.
+/// Every quantity that a log of a dual belt can have, alone with the encoders and all together: a scale at bridge or
+/// cart, a camera, an accelerometer at the cart, tachometers, currents and voltages.
 #[test]
 fn a_dual_belt_is_fitted_with_every_sensor() {
     let truth = case(MachineKind::DualBelt, &[SHORT, "bridge.mass=1", "cart.mass=0.4"]);

@@ -14,16 +14,10 @@ use taut::solve::{Ending, Solution, Solver, simulate};
 fn motor() -> impl Strategy<Value = Motor> {
     (0.01..0.1_f64, 0.3..3.0_f64, prop_oneof![Just(0.0), 1e-4..2e-3_f64], 0.0..1e-5_f64, 1.0..6.0_f64).prop_map(
         |(constant, resistance, inductance, rotor_inertia, gear_ratio)| Motor {
-            torque_constant: constant,
-            back_emf_constant: constant,
-            resistance,
             inductance,
             rotor_inertia,
             gear_ratio,
-            gear_efficiency: 1.0,
-            gear_play: None,
-            is_simple: false,
-            stepper: None,
+            ..Motor::brushed(constant, resistance)
         },
     )
 }

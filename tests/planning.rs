@@ -62,13 +62,9 @@ fn plans_keep_the_limits_and_arrive_sooner() {
             assert!(sooner > planned.bound.unwrap(), "{seed}");
             // What is told of the arrival is a run of its own.
             let setup = Setup {
-                machine: &case.machine,
-                model: &case.machine,
-                design,
-                profiles: &planned.profiles,
-                until: planned.profiles[0].end() + 0.5,
                 window: planned.window,
                 solver: Solver::Exact,
+                ..Setup::new(&case.machine, design, &planned.profiles, planned.profiles[0].end() + 0.5)
             };
             let settling = closed_loop(&setup).unwrap().figures.settling;
             assert_eq!(settling.map(|late| late + planned.profiles[0].end()), best.arrival.nominal, "{seed}");
@@ -80,13 +76,13 @@ fn plans_keep_the_limits_and_arrive_sooner() {
 fn run(case: &Case, plans: &Plans) -> MoveRun {
     let planned = &plans.moves[0];
     closed_loop(&Setup {
-        machine: &case.machine,
-        model: &case.machine,
-        design: case.controller.as_ref().unwrap(),
-        profiles: &planned.profiles,
-        until: planned.profiles[0].rest() + 0.3,
         window: planned.window,
-        solver: Solver::for_machine(&case.machine),
+        ..Setup::new(
+            &case.machine,
+            case.controller.as_ref().unwrap(),
+            &planned.profiles,
+            planned.profiles[0].rest() + 0.3,
+        )
     })
     .unwrap()
 }

@@ -53,13 +53,9 @@ fn needs_are_those_of_a_loop_that_follows_closely() {
     let design = case.controller.as_ref().unwrap();
     for motion in &case.moves {
         let setup = Setup {
-            machine: &case.machine,
-            model: &case.machine,
-            design,
-            profiles: &motion.profiles,
-            until: motion.until,
             window: motion.window,
             solver: Solver::Exact,
+            ..Setup::new(&case.machine, design, &motion.profiles, motion.until)
         };
         let figures = closed_loop(&setup).unwrap().figures;
         let [volts, amperes] = ["voltage", "current"].map(|limit| needed(&case.machine, motion.profile(), limit));

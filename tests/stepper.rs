@@ -481,7 +481,8 @@ fn a_small_command_at_a_speed_moves_the_cart_as_the_linear_model_of_that_speed_s
 
 #[test]
 fn all_that_a_stepper_moves_swings_on_the_stiffness_of_its_field() {
-    // As one mass on N T_h, and on a full step at rest N (T_h − 4 T_d); with a voltage on the phases, back-EMF damps it.
+    // As one mass on N T_h, and on a full step at rest N (T_h − 4 T_d); with a voltage on the phases, back-EMF damps
+    // it.
     let (holding, detent, radius, n) = (0.45, 15e-3, 6.4e-3, 50.0);
     let text = plain(holding, radius, 16, "[cart]\nmass = 0.4\n")
         .replace("rotor_inertia", "detent_torque = 15e-3\nrotor_inertia")
@@ -768,8 +769,8 @@ impl Plotter {
         rate
     }
 
-    /// Positions of bridge and cart every millisecond, and the corrections at the end: classical formula from edge to edge
-    /// of the microsteps and the corrections.
+    /// Positions of bridge and cart every millisecond, and the corrections at the end: classical formula from edge to
+    /// edge of the microsteps and the corrections.
     fn integrate(&self) -> (Vec<[f64; 2]>, [f64; 2]) {
         let mut s = [0.0; 12];
         s[8..].fill(self.motor.rated);
@@ -881,15 +882,7 @@ fn a_move_beyond_the_pull_out_torque_is_told_and_a_planned_one_loses_no_step() {
     assert!(case.moves[1].shortfalls(&case.machine, design).is_empty());
     let run = |motion: &Move| {
         let until = motion.until;
-        let setup = Setup {
-            machine: &case.machine,
-            model: &case.machine,
-            design,
-            profiles: &motion.profiles,
-            until,
-            window: motion.window,
-            solver: Solver::for_machine(&case.machine),
-        };
+        let setup = Setup { window: motion.window, ..Setup::new(&case.machine, design, &motion.profiles, until) };
         closed_loop(&setup).unwrap()
     };
     let [far, planned] = [0, 1].map(|k| run(&case.moves[k]));
@@ -920,16 +913,8 @@ fn corrected(gains: &str, coulomb: f64, (speed, acceleration): (f64, f64), chang
 
 fn moved(case: &Case) -> MoveRun {
     let (design, motion) = (case.controller.as_ref().unwrap(), &case.moves[0]);
-    closed_loop(&Setup {
-        machine: &case.machine,
-        model: &case.machine,
-        design,
-        profiles: &motion.profiles,
-        until: motion.until,
-        window: motion.window,
-        solver: Solver::for_machine(&case.machine),
-    })
-    .unwrap()
+    closed_loop(&Setup { window: motion.window, ..Setup::new(&case.machine, design, &motion.profiles, motion.until) })
+        .unwrap()
 }
 
 /// The loop of an encoder around a field: its integral removes what friction leaves of the way, and without gains it is

@@ -269,13 +269,10 @@ fn the_worst_axis_is_worse_than_random_ones() {
                 }
                 let motion = &case.moves[0];
                 let setup = Setup {
-                    machine: &stage,
                     model: &case.machine,
-                    design,
-                    profiles: &motion.profiles,
-                    until: 8.0,
                     window: 1e-3,
                     solver: Solver::Exact,
+                    ..Setup::new(&stage, design, &motion.profiles, 8.0)
                 };
                 let run = closed_loop(&setup).unwrap();
                 assert_eq!(run.outcome.ending, Ending::Complete);

@@ -329,7 +329,8 @@ impl Planner<'_> {
         Ok((tried, refused))
     }
 
-    /// Plan within these limits or slower ones, with its arrival on this machine by this solver, or what its run exceeds.
+    /// Plan within these limits or slower ones, with its arrival on this machine by this solver, or what its run
+    /// exceeds.
     fn tried_at(
         &self,
         search: &Search,
@@ -417,7 +418,8 @@ impl Planner<'_> {
     fn best(&self, search: &Search, tried: &mut [Tried]) -> Result<(Tried, Option<&Machine>)> {
         tried.sort_by(|a, b| a.rank().total_cmp(&b.rank()));
         let (mut best, mut slowest, mut is_run) = (tried[0].clone(), None, false);
-        // Runs of steppers take long: those of a plan end at a machine that arrives too late, unless all plans have one.
+        // Runs of steppers take long: those of a plan end at a machine that arrives too late, unless all plans have
+        // one.
         let is_slow = self.family.machine.stepper().is_some();
         let mut first = 0;
         for is_cut in [is_slow, false] {

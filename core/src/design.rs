@@ -1,8 +1,8 @@
 //! A controller as data: its timing, its structure with its gains, and the parts around it.
 //!
 //! A command is in units of the amplifier's input (V in voltage mode, A in current mode; of a stepper, m that are added
-//! to its reference), a position in m along the belt: r φ from an encoder at motor or pulley, x from one at the cart. The
-//! crate `taut-control` steps it in time.
+//! to its reference), a position in m along the belt: r φ from an encoder at motor or pulley, x from one at the cart.
+//! The crate `taut-control` steps it in time.
 
 pub mod placement;
 mod tunable;

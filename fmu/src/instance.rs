@@ -351,17 +351,18 @@ impl Instance {
                 pieces[drive] = Piece { start: since - self.begin, end: f64::INFINITY, coefficients };
             }
         }
-        let commands = self.control.iter().flat_map(Stepped::commands);
-        for ((piece, command), shares) in pieces.iter_mut().zip(commands).zip(self.model.machine().belt_shares()) {
+        for (piece, command) in pieces.iter_mut().zip(self.control.iter().flat_map(Stepped::commands)) {
             *piece = held(*command);
-            if self.model.machine().stepper().is_none() {
-                continue;
-            }
+        }
+        let machine = self.model.machine();
+        if self.control.is_some() && machine.stepper().is_some() {
             // The command of a stepper corrects the reference of its part of the belt.
-            for (slide, share) in shares.iter().enumerate() {
-                let Input { since, coefficients } = self.inputs[REFERENCES * slide];
-                let now = shifted(&coefficients, self.time - since);
-                piece.coefficients.iter_mut().zip(now).for_each(|(sum, own)| *sum += share * own);
+            for (piece, shares) in pieces.iter_mut().zip(machine.belt_shares()) {
+                for (slide, share) in shares.iter().enumerate() {
+                    let Input { since, coefficients } = self.inputs[REFERENCES * slide];
+                    let now = shifted(&coefficients, self.time - since);
+                    piece.coefficients.iter_mut().zip(now).for_each(|(sum, own)| *sum += share * own);
+                }
             }
         }
         pieces

@@ -60,13 +60,9 @@ fn is_that_of(name: &str, changes: &[&str], ahead: bool, most: f64) {
     for (milliseconds, parts) in [(30, 1), (80, 3), (600, 1), (600, 3)] {
         let until = f64::from(milliseconds) * 1e-3;
         let setup = Setup {
-            machine: &case.machine,
-            model: &case.machine,
-            design,
-            profiles: &shown.profiles,
-            until,
             window: shown.window,
             solver: Solver::Exact,
+            ..Setup::new(&case.machine, design, &shown.profiles, until)
         };
         let wanted: Vec<f64> = closed_loop(&setup).unwrap().figures.loads.iter().map(|load| load.error.last).collect();
         assert_eq!(wanted.len(), slides.len());

@@ -35,13 +35,10 @@ pub fn is_that_of_runs(name: &str, case: &Case, every: usize) {
     // At the limit itself it grows and dies out too slowly to be seen.
     for step in (1..29).step_by(every).filter(|&step| told[step - 1] == told[step + 1]) {
         let run = closed_loop(&Setup {
-            machine: &louder(step),
             model: &case.machine,
-            design,
-            profiles: &case.moves[0].profiles,
-            until: 12.0,
             window: 1e-3,
             solver: Solver::Exact,
+            ..Setup::new(&louder(step), design, &case.moves[0].profiles, 12.0)
         })
         .unwrap();
         let calm = run.outcome.ending == Ending::Complete && run.figures.settling.is_some_and(|s| s < 9.0);

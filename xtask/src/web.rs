@@ -57,7 +57,8 @@ fn module(compiler: &Compiler) -> Result<PathBuf, String> {
     let target = build_folder();
     let mut build = crate::cargo(&["build", "--locked", "--profile", "web", "--package", "taut-web", "--lib"]);
     build.args(["--target", TARGET, "--target-dir"]).arg(&target);
-    // Paths of the machine that builds it do not belong in a published file. All browsers have vectors since Safari 16.4.
+    // Paths of the machine that builds it do not belong in a published file. All browsers have vectors since Safari
+    // 16.4.
     let mut flags = package::flags(Path::new("."))?;
     flags.push("-Ctarget-feature=+simd128".into());
     build.env("CARGO_ENCODED_RUSTFLAGS", flags.join("\u{1f}"));

@@ -73,10 +73,8 @@ fn open_loop(root: &Table) -> Result<Option<Design>> {
         return Ok(asks.map(|_| Design::open_loop(EVERY, Vec::new())));
     };
     let table = field.table()?;
-    if let Some(key) = table.keys().find(|key| !OF_STEPPER.contains(key)) {
-        return Err(table
-            .optional(key)
-            .unwrap_or_else(|| table.field.clone())
+    if let Some(field) = table.first_beyond(&OF_STEPPER) {
+        return Err(field
             .fail("the controller of a stepper corrects the position that its driver is commanded")
             .allowed("pid, with every, delay, limit, filters and shaper; in open loop shaper and every alone")
             .next("leave it out"));
@@ -84,10 +82,8 @@ fn open_loop(root: &Table) -> Result<Option<Design>> {
     if table.optional("pid").is_some() {
         return Ok(None);
     }
-    if let Some(key) = table.keys().find(|key| !OF_STEPPER[..OF_OPEN_LOOP].contains(key)) {
-        return Err(table
-            .optional(key)
-            .unwrap_or_else(|| table.field.clone())
+    if let Some(field) = table.first_beyond(&OF_STEPPER[..OF_OPEN_LOOP]) {
+        return Err(field
             .fail("without pid a stepper follows its reference in open loop, which has no command to correct")
             .allowed("shaper, and every for the interval between rows")
             .next("leave it out, or add pid, which corrects the position by an encoder"));

@@ -291,6 +291,12 @@ impl<'a> Table<'a> {
         self.entries.iter().map(|e| e.key.as_str())
     }
 
+    /// The first key that is none of these.
+    pub fn first_beyond(&self, known: &[&str]) -> Option<Field<'a>> {
+        let key = self.keys().find(|key| !known.contains(key))?;
+        Some(self.optional(key).unwrap_or_else(|| self.field.clone()))
+    }
+
     pub fn optional(&self, key: &str) -> Option<Field<'a>> {
         let own = self.entries.iter().find(|e| e.key == key).map(|e| self.child(e));
         own.or_else(|| self.base.as_ref()?.optional(key))

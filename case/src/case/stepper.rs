@@ -48,16 +48,10 @@ pub(super) fn drive(root: &Table) -> Result<Option<DriveUnit>> {
     let drives = [("chopper", true), ("voltage", false)];
     let is_chopper = table.optional("drive").map_or(Ok(true), |field| field.choice(&drives))?;
     let mut motor = Motor {
-        torque_constant: 0.0,
-        back_emf_constant: 0.0,
-        resistance: table.number("resistance")?,
         inductance: table.number("inductance")?,
         rotor_inertia: table.number("rotor_inertia")?,
-        gear_ratio: 1.0,
-        gear_efficiency: 1.0,
-        gear_play: None,
-        is_simple: false,
         stepper: Some(stepper),
+        ..Motor::brushed(0.0, table.number("resistance")?)
     };
     let torque = table.number("holding_torque")?;
     motor.set_holding_torque(torque);

@@ -113,10 +113,8 @@ pub(super) fn tuning(
     let placed = tuned_by == TunedBy::Bandwidth;
     // Of steppers in open loop it says for which family moves are planned.
     let of_open_loop = design.is_open_loop();
-    if let Some(key) = table.keys().find(|key| of_open_loop && !["spread", "load", "places"].contains(key)) {
-        return Err(table
-            .optional(key)
-            .unwrap_or_else(|| field.clone())
+    if of_open_loop && let Some(field) = table.first_beyond(&["spread", "load", "places"]) {
+        return Err(field
             .fail("a stepper in open loop has no gains to tune")
             .allowed("spread, load and places: the machines that a move is planned for"));
     }

@@ -218,7 +218,8 @@ f = fopen('out.bin', 'w'); fwrite(f, (out.position(2:end, :) .* m.levers')', 'do
 printf('%d ', out.lost_steps(end, :));
 ";
 
-/// The scripts of Python and MATLAB: each position within 1e-8 m of taut's while no step is lost, and the same steps lost.
+/// The scripts of Python and MATLAB: each position within 1e-8 m of taut's while no step is lost, and the same steps
+/// lost.
 #[test]
 fn drawn_machines_go_in_python_and_octave_where_taut_has_them() {
     let has_octave = are_there(&["octave-cli"]);

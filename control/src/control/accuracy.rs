@@ -1,6 +1,6 @@
 //! The accuracy of a move: how far its positions may be wrong, by a second run.
 
-use super::outcome::{MoveRun, Rows, at_rest, corrected, driven};
+use super::outcome::{MoveRun, Rows, at_rest, driven};
 use super::sampled::{Controller, Loop};
 use super::sampling::Sampled;
 use crate::case::Experiment;
@@ -74,8 +74,7 @@ impl<'a> Accuracy<'a> {
         let solvers = [solver, ErrorEstimate::second(solver, !controllers.is_empty())];
         let course = Course::new(&mechanism, &experiment);
         controllers.iter_mut().for_each(|controller| controller.reset());
-        let sampled = Sampled::new(machine, controllers, timing, profiles, false).until(experiment.until);
-        let mut sampled = sampled.correcting(corrected(machine, &experiment));
+        let mut sampled = Sampled::new(machine, controllers, timing, profiles, false).along(machine, &experiment);
         let error = estimate.finish_driven(&mechanism, &course, solvers, (&run.outcome, flow), &mut |second| {
             driven(second, &experiment, &mut sampled, |_, _, _| {})
         })?;

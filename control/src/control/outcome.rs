@@ -122,8 +122,7 @@ pub(super) fn unrecorded(
     see: impl FnMut(f64, &State, &[f64]),
 ) -> Result<solve::Outcome> {
     controllers.iter_mut().for_each(|controller| controller.reset());
-    let sampled = Sampled::new(machine, controllers, *timing, profiles, false).until(experiment.until);
-    let mut sampled = sampled.correcting(corrected(machine, experiment));
+    let mut sampled = Sampled::new(machine, controllers, *timing, profiles, false).along(machine, experiment);
     let sink = &mut |_: &Trajectory| Flow::Continue;
     let observer = observer.map(|observer| observer as &mut dyn Observe);
     let run = solve::Run::reading(read(machine), experiment, solver, Detail::None, observer, sink)?;
@@ -143,8 +142,7 @@ pub(crate) fn recorded(
     timing.check(until)?;
     let experiment = at_rest(machine, profiles, until, timing.every.min(until));
     controllers.iter_mut().for_each(|controller| controller.reset());
-    let sampled = Sampled::new(machine, controllers, *timing, profiles, true).until(until);
-    let mut sampled = sampled.correcting(corrected(machine, &experiment));
+    let mut sampled = Sampled::new(machine, controllers, *timing, profiles, true).along(machine, &experiment);
     let run = solve::Run::new(machine, &experiment, solver, Detail::Full, None, sink)?;
     driven(run, &experiment, &mut sampled, |_, _, _| {});
     Ok(sampled.kept.unwrap_or_default())
@@ -162,11 +160,6 @@ pub(super) fn driven(
     }
     sampled.drive(&mut run, experiment.until, see);
     run.finish()
-}
-
-/// The references that the controllers of a machine correct: those of steppers.
-pub(super) fn corrected<'a>(machine: &Machine, experiment: &'a Experiment) -> &'a [Signal] {
-    if machine.stepper().is_some() { &experiment.inputs } else { &[] }
 }
 
 /// A run from rest at the start of the profiles; its inputs are the references of steppers, none for other motors.
@@ -258,8 +251,7 @@ fn run(
     }
     let experiment = at_rest(machine, profiles, rows.until, rows.every);
     controllers.iter_mut().for_each(|controller| controller.reset());
-    let sampled = Sampled::new(machine, controllers, *timing, profiles, keep).until(rows.until);
-    let mut sampled = sampled.correcting(corrected(machine, &experiment));
+    let mut sampled = Sampled::new(machine, controllers, *timing, profiles, keep).along(machine, &experiment);
     let mut gauge = Gauge::new(machine, &experiment, profiles, rows.window);
     let run = solve::Run::reading(read(machine), &experiment, solver, detail, Some(&mut gauge), sink)?;
     let mut outcome = driven(run, &experiment, &mut sampled, |_, _, _| {});

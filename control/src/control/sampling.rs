@@ -3,6 +3,7 @@
 use super::rest::Rest;
 use super::sampled::{Added, Controller, Loop, SLIDES, Sample};
 use super::stepped::{Clocked, Commands, Decision, References};
+use crate::case::Experiment;
 use crate::machine::Machine;
 use crate::mechanism::{DRIVES, State};
 use crate::signal::Signal;
@@ -70,22 +71,18 @@ impl<'a, 'c> Sampled<'a, 'c> {
         }
     }
 
-    /// For a run that ends there, which ends the holding of commands.
-    pub(super) fn until(mut self, until: f64) -> Self {
-        self.until = until;
-        self.told = [DriveCommands::new(self.profiles.first().map_or(0.0, Profile::end), until); DRIVES];
+    /// For a run of this experiment on this machine: its end ends the holding of commands, and controllers of steppers
+    /// correct its references.
+    pub(super) fn along(mut self, machine: &Machine, experiment: &'a Experiment) -> Self {
+        self.until = experiment.until;
+        self.told = [DriveCommands::new(self.profiles.first().map_or(0.0, Profile::end), self.until); DRIVES];
+        self.references = if machine.stepper().is_some() { &experiment.inputs } else { &[] };
         self
     }
 
     /// With a known input added to the commands of the first drive.
     pub(super) fn with(mut self, added: Option<&'a Added>) -> Self {
         self.added = added;
-        self
-    }
-
-    /// With these references of steppers, which the commands correct.
-    pub(super) fn correcting(mut self, references: &'a [Signal]) -> Self {
-        self.references = references;
         self
     }
 
@@ -119,8 +116,8 @@ impl Sampled<'_, '_> {
         }
     }
 
-    /// Holds commands, with signals added to them, or corrections of a stepper's reference, until `end`, s; false if the
-    /// run ends.
+    /// Holds commands, with signals added to them, or corrections of a stepper's reference, until `end`, s; false if
+    /// the run ends.
     fn hold(&self, run: &mut Run, commands: &[f64], end: f64) -> bool {
         if !self.references.is_empty() {
             return run.hold_added(self.references, commands, end);

@@ -10,8 +10,9 @@ pub(crate) const CASCADE: f64 = 4.0;
 /// The design with gains that place the poles of M ẍ + d ẋ = g u by `bandwidth` (Hz) and `damping` ζ, without delay and
 /// sampling; none for a structure without such gains. A gain that is zero in the design stays zero.
 ///
-/// PID of a stepper, whose field is a spring k: K_i/(1 + K_p) = ω₀, and K_d damps the mass on the spring by ζ; K_p stays.
-/// PID of other motors: with an integral all three poles, (s + ζω₀)(s² + 2ζω₀ s + ω₀²), ω₀ = 2π f; without one s² + 2ζω₀ s + ω₀².
+/// PID of a stepper, whose field is a spring k: K_i/(1 + K_p) = ω₀, and K_d damps the mass on the spring by ζ; K_p
+/// stays. PID of other motors: with an integral all three poles, (s + ζω₀)(s² + 2ζω₀ s + ω₀²), ω₀ = 2π f; without one
+/// s² + 2ζω₀ s + ω₀².
 /// Cascade: K_v = ω₀, the speed loop s² + 2ζω_v s + ω_v² with ω_v = 4 ω₀ (without its integral the pole −ω_v), and the
 /// current loop −4 ω_v, or −1/(2 (T/2 + delay)) if sampling limits it. If the drag of the axis alone exceeds the
 /// damping, the gain is a twentieth, as a start for a search.

@@ -193,8 +193,8 @@ impl Rigid {
         c.name("per_ampere", per_ampere)
     }
 
-    /// Command, V or A, or the lead of a stepper's field in m, for `force` (N, changing at `rate`, N/s), the rotor's own included, while the drive pulley moves
-    /// like this.
+    /// Command, V or A, or the lead of a stepper's field in m, for `force` (N, changing at `rate`, N/s), the rotor's
+    /// own included, while the drive pulley moves like this.
     pub fn command(&self, force: f64, rate: f64, drive: &Reference) -> f64 {
         self.command_by(&mut Evaluation::plain(), force, rate, drive)
     }

@@ -167,25 +167,13 @@ impl Sub for Form {
 mod tests {
     use super::*;
     use crate::chance::uniform;
-    use crate::mechanism::{Body, Label, MotionKind, Spring, SpringLaw};
+    use crate::mechanism::testing::{body, spring};
     use rand_pcg::Pcg64;
 
     /// Two bodies on a spring.
     fn mechanism() -> Mechanism {
-        let label = Label { key: "part", name: "part" };
-        let body = |index: usize| Body {
-            label,
-            kind: MotionKind::Linear,
-            inertia: 1.0,
-            friction: Default::default(),
-            force: 0.0,
-            along: None,
-            leader: (index, 1.0),
-            is_rotor: false,
-        };
-        let arms = vec![(0, 1.0), (1, -1.0)];
-        let spring = Spring { label, arms, stiffness: 1e4, damping: 0.0, law: SpringLaw::TwoSided, follows: None };
-        Mechanism::new(vec![body(0), body(1)], vec![spring], Vec::new())
+        let spring = spring(&[(0, 1.0), (1, -1.0)], 1e4);
+        Mechanism::new(vec![body(0, 1.0), body(1, 1.0)], vec![spring], Vec::new())
     }
 
     #[test]

@@ -19,6 +19,8 @@ mod nudge;
 mod phases;
 mod power;
 mod ride;
+#[cfg(test)]
+pub(crate) mod testing;
 mod transition;
 
 pub use drive::{Amplifier, AmplifierMode, GearPlay, Motor, Stepper};

@@ -115,8 +115,8 @@ impl Phases {
         self.rate_at([sin, cos], along, speed, current)
     }
 
-    /// Rate of a phase current without −R i/L, with sine and cosine of the rotor's electrical angle ε − σ and the cosine
-    /// of the commanded one, ψ − σ.
+    /// Rate of a phase current without −R i/L, with sine and cosine of the rotor's electrical angle ε − σ and the
+    /// cosine of the commanded one, ψ − σ.
     #[inline(always)]
     pub fn rate_at(&self, [sin, cos]: [f64; 2], along: f64, speed: f64, current: f64) -> PhaseRate {
         let (k, n, l) = (self.torque_constant, self.teeth, self.inductance);

@@ -163,25 +163,14 @@ impl Mechanism {
 mod tests {
     use super::*;
     use crate::friction::Friction;
-    use crate::mechanism::{Body, Label, MotionKind, Spring};
+    use crate::mechanism::testing::{body, spring};
+    use crate::mechanism::{Body, Spring};
 
     /// A mass of 2 kg with friction and one of 3 kg without, between which is a damped spring.
     fn pair() -> Mechanism {
-        let label = Label { key: "part", name: "part" };
-        let body = |index: usize, inertia: f64, friction: Friction| Body {
-            label,
-            kind: MotionKind::Linear,
-            inertia,
-            friction,
-            force: 0.0,
-            along: None,
-            leader: (index, 1.0),
-            is_rotor: false,
-        };
-        let arms = vec![(0, 1.0), (1, -1.0)];
-        let spring = Spring { label, arms, stiffness: 1e3, damping: 5.0, law: SpringLaw::TwoSided, follows: None };
-        let bodies = vec![body(0, 2.0, Friction::symmetric(4.0, 1.0)), body(1, 3.0, Friction::default())];
-        Mechanism::new(bodies, vec![spring], Vec::new())
+        let rough = Body { friction: Friction::symmetric(4.0, 1.0), ..body(0, 2.0) };
+        let spring = Spring { damping: 5.0, ..spring(&[(0, 1.0), (1, -1.0)], 1e3) };
+        Mechanism::new(vec![rough, body(1, 3.0)], vec![spring], Vec::new())
     }
 
     fn state(position: [f64; 2], speed: [f64; 2]) -> State {

@@ -165,35 +165,17 @@ impl Coordinates {
 mod tests {
     use super::*;
     use crate::machine::axis::{CART, DRIVE, IDLER};
-    use crate::mechanism::{Body, Label, Mechanism, MotionKind, Spring, SpringLaw};
+    use crate::mechanism::testing::{body, spring};
+    use crate::mechanism::{Body, Mechanism, MotionKind, Spring};
 
     /// Two pulleys and a cart on three spans, as the paper's axis.
     fn mechanism() -> (Mechanism, f64) {
         let r = 0.0194;
-        let label = Label { key: "part", name: "part" };
-        let body = |index: usize, kind, inertia| Body {
-            label,
-            kind,
-            inertia,
-            friction: Default::default(),
-            force: 0.0,
-            along: None,
-            leader: (index, 1.0),
-            is_rotor: false,
-        };
         let turns = MotionKind::Rotary { radius: r };
-        let bodies =
-            vec![body(DRIVE, turns, 6.3e-5), body(CART, MotionKind::Linear, 0.362), body(IDLER, turns, 3.3e-5)];
+        let pulley = |number, inertia| Body { kind: turns, ..body(number, inertia) };
+        let bodies = vec![pulley(DRIVE, 6.3e-5), body(CART, 0.362), pulley(IDLER, 3.3e-5)];
         let arms = [[(DRIVE, r), (CART, -1.0)], [(CART, 1.0), (IDLER, -r)], [(IDLER, r), (DRIVE, -r)]];
-        let spring = |arms: [(usize, f64); 2]| Spring {
-            label,
-            arms: arms.to_vec(),
-            stiffness: 1e5,
-            damping: 0.0,
-            law: SpringLaw::TwoSided,
-            follows: None,
-        };
-        (Mechanism::new(bodies, arms.map(spring).to_vec(), Vec::new()), r)
+        (Mechanism::new(bodies, arms.map(|arms| spring(&arms, 1e5)).to_vec(), Vec::new()), r)
     }
 
     fn at(drive: f64, cart: f64, idler: f64) -> State {

@@ -284,18 +284,7 @@ mod tests {
         let bristles = Law::LuGre { velocity: 4.2645, stiffness: 6.9088, damping: 1.5886e-4 };
         let gaussian = Law::Stribeck { velocity: 0.0066354, shape: Shape::Gaussian };
         let exponential = Law::Stribeck { velocity: 20.283, shape: Shape::Exponential };
-        let motor = Motor {
-            torque_constant: 0.045934,
-            back_emf_constant: 0.045934,
-            resistance: 1.0683,
-            inductance: 8.375e-4,
-            rotor_inertia: 0.0,
-            gear_ratio: 1.0,
-            gear_efficiency: 1.0,
-            stepper: None,
-            gear_play: None,
-            is_simple: false,
-        };
+        let motor = Motor { inductance: 8.375e-4, ..Motor::brushed(0.045934, 1.0683) };
         let mut belt = Belt::given([2062.0, 4735.0, 157_335.0], [0.0; 3]);
         belt.model = BeltModel::Rigid;
         let mut slide = Slide::new(0.65359, cart.following(gaussian));

@@ -377,10 +377,9 @@ mod tests {
     #[test]
     fn events_that_were_handed_on_are_counted() {
         let mut rules = Rules::new(Mode::new(std::iter::empty()));
-        let label = crate::mechanism::Label { key: "part", name: "part" };
         let event = Event {
             time: 0.0,
-            part: Part { what: What::Body(0), label },
+            part: Part { what: What::Body(0), label: crate::mechanism::testing::PART },
             from: Status::Motion(Motion::Stuck),
             to: Status::Motion(Motion::Forward),
             load: 0.0,

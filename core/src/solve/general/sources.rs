@@ -474,33 +474,21 @@ mod tests {
     use super::super::bristles::Bristle;
     use super::*;
     use crate::friction::{Friction, Shape};
-    use crate::mechanism::{BODIES, Body, Follows, Label, Layout, Mechanism, MotionKind, Spring, SpringLaw};
+    use crate::mechanism::testing::{body, spring};
+    use crate::mechanism::{BODIES, Body, Follows, Layout, Mechanism, Spring};
     use crate::polyline::Polyline;
     use std::sync::Arc;
 
     /// Two carts on a span that follows the first; the first one's friction has this law.
     fn model(law: Law, along: bool) -> Model {
-        let label = Label { key: "part", name: "part" };
         let friction = Friction::sided(
             Side { viscous: 3.0, coulomb: 1.0, breakaway: 1.6 },
             Side { viscous: 4.0, coulomb: 1.2, breakaway: 1.9 },
         );
-        let body = |index: usize, friction: Friction, along: Option<Polyline>| Body {
-            label,
-            kind: MotionKind::Linear,
-            inertia: 1.0,
-            friction,
-            force: 0.0,
-            along,
-            leader: (index, 1.0),
-            is_rotor: false,
-        };
         let line = Polyline::new(vec![[-1.0, 0.8], [1.0, 1.4]]).filter(|_| along);
         let follows = Follows { rigidity: 2e4, length: 0.6, arms: vec![(0, 1.0)] };
-        let arms = vec![(0, 1.0), (1, -1.0)];
-        let spring =
-            Spring { label, arms, stiffness: 3e4, damping: 0.0, law: SpringLaw::TwoSided, follows: Some(follows) };
-        let bodies = vec![body(0, friction.following(law), line), body(1, Friction::default(), None)];
+        let spring = Spring { follows: Some(follows), ..spring(&[(0, 1.0), (1, -1.0)], 3e4) };
+        let bodies = vec![Body { friction: friction.following(law), along: line, ..body(0, 1.0) }, body(1, 1.0)];
         let mechanism = Mechanism::new(bodies, vec![spring], Vec::new());
         let layout = Layout::new(&mechanism);
         Model::new(Arc::new(mechanism), layout)

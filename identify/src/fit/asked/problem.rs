@@ -179,8 +179,8 @@ impl<'a> Problem<'a> {
     }
 
     fn add_extras(&mut self, case: &Case, plan: &Plan) {
-        let &Nuisances { delay, drive_delay, input_gain, input_offset, initial_state, bias, .. } = &plan.nuisance;
-        let &Nuisances { sensor_play, sensor_scale, .. } = &plan.nuisance;
+        let &Nuisances { delay, drive_delay, input_gain, input_offset, initial_state, bias, sensor_play, sensor_scale } =
+            &plan.nuisance;
         let interval = self.runs[0].interval();
         // Samples that are taken after their stamps appear as an early input, if the input is logged.
         let mut inputs = self.runs.iter().flat_map(FittedLog::inputs);

@@ -420,8 +420,8 @@ pub(crate) struct InWindows<'a> {
     pub noise: Vec<(Quantity, f64)>,
 }
 
-/// The end of a rough search from `start` in the shorter ones of these windows, in which a wrong model stays in step with
-/// the logs. `None` if it fails.
+/// The end of a rough search from `start` in the shorter ones of these windows, in which a wrong model stays in step
+/// with the logs. `None` if it fails.
 pub(crate) fn end_in_windows<'a>(
     case: &Case,
     plan: &Plan,

@@ -111,8 +111,8 @@ mod tests {
 
     #[test]
     fn a_hunt_goes_on_where_it_ended() {
-        let folder = Path::new("target/tmp/mutants");
-        let _ = fs::remove_dir_all(folder);
+        let folder = std::env::temp_dir().join(format!("taut-xtask-mutants-{}", std::process::id()));
+        let folder = folder.as_path();
         let text = "fn least(a: f64, b: f64) -> bool { a < b }";
         let changes = super::super::change::of_text("least.rs", text).unwrap();
         let record = Record::open(folder, "source", &changes).unwrap();
@@ -137,5 +137,6 @@ mod tests {
         assert_eq!(again.trial(2, &changes[1]).noticed, Some((Ended::Not, "all slow".into())));
         // Another source begins anew.
         assert_eq!(Record::open(folder, "changed", &changes).unwrap().trial(1, &changes[0]).noticed, None);
+        fs::remove_dir_all(folder).unwrap();
     }
 }

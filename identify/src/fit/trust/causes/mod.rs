@@ -15,7 +15,8 @@
 //! On a machine of several coordinates, each drive, sensor or slide may have an element: the linear model predicts the
 //! costs of all, and only those with the least take steps. Such a machine swings out of step with a log that a wrong
 //! model cannot follow, and its fit ends anywhere. Where it does not end within the noise, elements are ranked in short
-//! windows, and begin with the values of the case and a search in windows, as the fit itself did, until one leaves noise.
+//! windows, and begin with the values of the case and a search in windows, as the fit itself did, until one leaves
+//! noise.
 
 mod amplifier;
 mod apart;

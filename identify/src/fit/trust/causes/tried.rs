@@ -208,8 +208,8 @@ impl<'a> Tried<'a> {
     }
 
     /// True if the logs may hardly tell another element of a machine of several coordinates from this one, by the least
-    /// that its fit may end with: with n values, of which slow noise leaves n/i², the logarithm of the likelihood is less by n/i²
-    /// ln(C′/C)/2.
+    /// that its fit may end with: with n values, of which slow noise leaves n/i², the logarithm of the likelihood is
+    /// less by n/i² ln(C′/C)/2.
     pub fn may_be_like(&self, judged: &Judged, other: &Self) -> bool {
         let is_other = !self.problem.machine.has_one_coordinate() && self.kind() != other.kind();
         let n = self.problem.counted() as f64 / (judged.inflation * judged.inflation).max(1.0);
