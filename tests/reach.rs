@@ -328,7 +328,7 @@ fn the_feed_forward_of_a_two_mass_belt_is_its_exact_inverse() {
     }
 }
 
-/// The same of spans that follow the cart, whose stiffness changes on the way.
+/// With spans that follow the cart, whose stiffness changes along its travel.
 #[test]
 fn the_feed_forward_of_a_two_mass_belt_contains_the_rates_of_its_stiffness() {
     let mut chance = Chance::new(33);

@@ -485,7 +485,7 @@ impl Planner<'_> {
         Ok(Arrival::new(Profile::last_end(profiles), &ran))
     }
 
-    /// The same with the whole family, and the machine that arrives last; only up to a machine that arrives later than
+    /// Arrival on the whole family, and the machine that arrives last; only up to a machine that arrives later than
     /// the bar, s, which is then the first one of the next family.
     fn of_family(
         &self,

@@ -174,7 +174,7 @@ struct Peak {
 }
 
 impl Peak {
-    /// Those of the values at the equidistant instants of a segment.
+    /// Peaks of the values at the equidistant instants of a segment.
     fn of_segment(points: &[Point]) -> Vec<Self> {
         let last = points.len() - 1;
         if last < 2 {

@@ -84,7 +84,7 @@ class Machine:
         self._take_up()
 
     def _turn_fields(self):
-        """What the drivers of steppers command of their phases: the fields stand where they are told."""
+        """What the drivers of steppers command of their phases: each field stands at its command."""
         for drive, (_, _, electrical, _, _, _, field, _, _) in enumerate(STEPPERS):
             angle = self.told[drive] * electrical + 0.25 * math.pi
             self.z[INPUT + 2 * drive : INPUT + 2 * drive + 2] = field * math.cos(angle), field * math.sin(angle)
