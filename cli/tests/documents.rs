@@ -53,22 +53,40 @@ fn lasting(text: &str) -> Vec<String> {
 /// True if an output is as the document shows it; a line `…` of the document stands for any lines.
 fn agrees(got: &str, want: &str) -> bool {
     let (got, parts) = (lasting(got), want.split("\n…").map(lasting).collect::<Vec<_>>());
-    match &parts[..] {
-        [whole] => got == *whole,
-        [first, .., last] => got.starts_with(first) && got.ends_with(last) && got.len() >= first.len() + last.len(),
-        [] => got.is_empty(),
-    }
+    let ([first, middle @ .., last], true) = (&parts[..], parts.len() > 1) else { return got == parts[0] };
+    let Some(mut rest) = got.strip_prefix(&first[..]).and_then(|rest| rest.strip_suffix(&last[..])) else {
+        return false;
+    };
+    middle.iter().all(|part| {
+        let place = (0..rest.len()).find(|&place| rest[place..].starts_with(part));
+        place.map(|place| rest = &rest[place + part.len()..]).is_some()
+    })
 }
 
-/// An output as the document is to show it: as short as it was.
+/// An output as the document is to show it: as short as it was. A part between two `…` begins at the line that shares
+/// the most first words with the line there.
 fn shown(got: &str, want: &str) -> String {
-    let Some((first, last)) = want.split_once("\n…") else { return got.to_string() };
-    let (first, last) = (first.lines().count(), last.trim_matches('\n').lines().count());
+    let parts: Vec<&str> = want.split("\n…").collect();
+    let ([first, middle @ .., last], true) = (&parts[..], parts.len() > 1) else { return got.to_string() };
+    let count = |part: &str| part.trim_matches('\n').lines().count();
     let lines: Vec<&str> = got.trim_end_matches('\n').lines().collect();
-    let end = lines.len().saturating_sub(last);
-    let mut text = lines[..first.min(end)].join("\n") + "\n…\n";
-    lines[end..].iter().for_each(|line| text.extend([line, "\n"]));
-    text
+    let end = lines.len().saturating_sub(count(last));
+    let mut from = first.lines().count().min(end);
+    let mut shown = lines[..from].to_vec();
+    for part in middle {
+        let before = part.trim_matches('\n').lines().next().unwrap_or_default();
+        let shared = |line: &str| {
+            let pairs = line.split_whitespace().zip(before.split_whitespace());
+            pairs.take_while(|(now, before)| now == before).count()
+        };
+        let place = (from..end).rev().max_by_key(|&k| shared(lines[k])).unwrap_or(from);
+        from = (place + count(part)).min(end);
+        shown.push("…");
+        shown.extend(&lines[place..from]);
+    }
+    shown.push("…");
+    shown.extend(&lines[end..]);
+    shown.join("\n") + "\n"
 }
 
 #[test]
@@ -81,6 +99,11 @@ fn a_document_may_leave_out_the_effort_and_long_middles() {
     assert!(!agrees(got, &want.replace("1001", "1002").replace("41\nsimulations", "7 simulations")));
     assert!(agrees(got, "  fit   0.5 kg\n…\nend") && !agrees(got, "  fit   0.6 kg\n…\nend"));
     assert_eq!(shown(got, "  fit   0.6 kg\n…\nend"), "  fit   0.5 kg\n…\nend\n");
+    // Between two dots, too.
+    let long = "a\nb 1\nc\nd 2\ne\nf\n";
+    assert!(agrees(long, "a\n…\nd 2\n…\nf") && !agrees(long, "a\n…\nd 3\n…\nf") && !agrees(long, "a\n…\nd 2\n…\nc"));
+    assert!(!agrees(long, "a\n…\nd 2\n…\nc\n…\nf"), "in their order");
+    assert_eq!(shown(long, "a\n…\nd 3\n…\nf"), "a\n…\nd 2\n…\nf\n");
     // An empty line in the end is one of its lines: the line behind the dots was lost.
     assert_eq!(shown("a\nb\nc\n\nd\n", "a\n…\nc\n\nd"), "a\n…\nc\n\nd\n");
 }

@@ -3,7 +3,7 @@
 //! `cargo xtask data` fetches other people's measurements, `cargo xtask bad` writes the wrong inputs of `tests/bad` as
 //! whole files, `cargo xtask package` builds all that a release consists of and tries it,
 //! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
-//! the tables of docs/fit.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask fmu` calls
+//! the tables of docs/fit.md, `cargo xtask end-to-end` that of docs/tune.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask fmu` calls
 //! the functions of FMI at random under address sanitizer, `cargo xtask drag`, `cargo xtask load` and `cargo xtask
 //! first-fit` measure the studio, `cargo xtask web` makes a folder of it that needs no server, `cargo xtask book`
 //! builds the documents as a book and checks its links.
@@ -111,6 +111,7 @@ fn main() -> ExitCode {
         ["first-fit", ref words @ ..] => studio::first_fit(words),
         ["coverage", ref words @ ..] => example("coverage", words),
         ["faults", ref words @ ..] => example("faults", words),
+        ["end-to-end", ref words @ ..] => example("end_to_end", words),
         ["hunt", ref words @ ..] => match hunt::Hunt::new(words) {
             Ok(hunt) => hunt.run(),
             Err(told) => {
@@ -122,6 +123,7 @@ fn main() -> ExitCode {
             eprintln!(
                 "usage: cargo xtask test | cargo xtask bad | cargo xtask browser | cargo xtask export | \
                  cargo xtask python | cargo xtask coverage [...] | cargo xtask faults [...] | \
+                 cargo xtask end-to-end [...] | \
                  {} | {} | {} | {} | {} | {} | {} | {} | {} | {}",
                 book::USAGE,
                 package::USAGE,

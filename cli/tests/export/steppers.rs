@@ -124,7 +124,7 @@ fn drawn_machines_go_where_taut_has_them() {
         return;
     }
     let (mut lost_any, mut kept_all) = (0, 0);
-    for seed in 0..16 {
+    for seed in 0..8 {
         let drawn = drawn(500 + seed);
         let (case, solution) = solved(&drawn);
         let mechanism = case.machine.mechanism();
@@ -181,7 +181,7 @@ fn drawn_machines_go_where_taut_has_them() {
             lost_any += 1;
         }
     }
-    assert!(lost_any > 0 && kept_all > 4, "{lost_any} lost steps, {kept_all} did not");
+    assert!(lost_any > 0 && kept_all > 2, "{lost_any} lost steps, {kept_all} did not");
 }
 
 /// Each position of every body after each step, in m at the belt, by taut's own solver.
@@ -254,7 +254,7 @@ fn drawn_machines_go_in_python_and_octave_where_taut_has_them() {
             compare("python", &folder, &told);
         }
         // Octave takes a minute for some of them.
-        if has_octave && seed % 2 == 0 {
+        if has_octave && seed == 0 {
             let folder = exported_to(&drawn, "matlab", "axis.m");
             fs::write(folder.path().join("check.m"), IN_OCTAVE).unwrap();
             let told = run(folder.path(), "octave-cli", &["--no-init-file", "--quiet", "check.m"]);
