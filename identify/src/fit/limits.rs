@@ -7,7 +7,7 @@
 
 /// Error that numbers in files and solvers may have, as a share of the range of a quantity.
 ///
-/// Unit: 1. Source: ten digits, which the usual logs of simulations have.
+/// Unit: 1. Source: ten digits, which the usual logs of simulations have. Test: `limits_are_in_order`.
 pub(crate) const FILE_ROUNDING: f64 = 1e-10;
 
 /// Error of a delay that counts as 100 %, from which on it is not determined.
@@ -53,7 +53,7 @@ pub(crate) const INPUT_BEFORE_WINDOW: usize = 60;
 /// Step of the central differences of the equations of motion, relative to a variable or its unit: truncation and
 /// rounding of one of many terms balance there.
 ///
-/// Unit: 1. Source: balance of truncation and rounding.
+/// Unit: 1. Source: balance of truncation and rounding. Test: `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const EQUATION_STEP: f64 = 3e-5;
 
 /// Step by which a start is moved; the state is linear in it.
@@ -65,12 +65,13 @@ pub(crate) const START_STEP: f64 = 1e-2;
 
 /// Residual beyond which Huber's loss is linear.
 ///
-/// Unit: standard deviations. Source: P. J. Huber 1964: 95 % efficient for Gaussian noise.
+/// Unit: standard deviations. Source: P. J. Huber 1964: 95 % efficient for Gaussian noise. Test:
+/// `limits_of_normal_deviates_are_theirs`.
 pub(crate) const HUBER: f64 = 1.345;
 
 /// Promised gain below which a search measures derivatives over `PAST_KINKS`.
 ///
-/// Unit: standard errors. Source: chosen.
+/// Unit: standard errors. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const NEAR: f64 = 1.0;
 
 /// Promised gain below which a search measures central derivatives, which cost twice as much.
@@ -81,7 +82,7 @@ pub(crate) const SHARP: f64 = 0.1;
 
 /// Step of derivatives near a minimum and in a posterior: large enough to pass over small kinks by sticks and slips.
 ///
-/// Unit: standard errors of a variable by itself. Source: chosen.
+/// Unit: standard errors of a variable by itself. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const PAST_KINKS: f64 = 0.3;
 
 /// Maximum number of variables that evolution searches.
@@ -91,7 +92,7 @@ pub(crate) const MOST_EVOLVED: usize = 16;
 
 /// Generations without a gain of `SHOWS` after which an evolution ends.
 ///
-/// Unit: generations. Source: chosen.
+/// Unit: generations. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const BARREN: usize = 8;
 
 /// Promised gain at which a minimum on a kink counts as converged: of all gradients around together, or of one that no
@@ -103,7 +104,7 @@ pub(crate) const KINK: f64 = 0.1;
 /// Two consecutive steps with a gain below this, and far below the promised one, indicate a kink; so do steps after
 /// which twice this is still promised.
 ///
-/// Unit: standard errors. Source: a tenth of what noise makes of an estimate.
+/// Unit: standard errors. Source: a tenth of what noise makes of an estimate. Test: `limits_are_in_order`.
 pub(crate) const SHOWS: f64 = 0.1;
 
 /// Step size along the longest axis at which an evolution ends.
@@ -113,12 +114,12 @@ pub(crate) const SMALLEST_STEP: f64 = 0.01;
 
 /// Share of its promised gain that a step of a bundle must keep to be taken.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const KEPT: f64 = 0.1;
 
 /// Share of the promised gain by which a new piece must contradict a step for the next step to be another.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const CONTRADICTS: f64 = 0.5;
 
 /// Maximum halvings of a step of a bundle that is neither good nor informative.
@@ -133,7 +134,7 @@ pub(crate) const SPARE_PIECES: usize = 10;
 
 /// Regularisation of the metric of a bundle, relative to the norm of a variable's own column.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const FIRM: f64 = 1e-3;
 
 /// Maximum rounds in which weights are estimated from the residuals.
@@ -143,17 +144,17 @@ pub(crate) const WEIGHT_ROUNDS: usize = 4;
 
 /// Maximum Jacobians of a start other than the first, before the best of them goes on.
 ///
-/// Unit: Jacobians. Source: chosen.
+/// Unit: Jacobians. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const TRIAL_ITERATIONS: usize = 12;
 
 /// Gain that the last step may promise in a fit that is only compared with another: a trial, a candidate law, a start.
 ///
-/// Unit: standard errors. Source: a tenth of what noise makes of an estimate.
+/// Unit: standard errors. Source: a tenth of what noise makes of an estimate. Test: `limits_are_in_order`.
 pub(crate) const ROUGH_TOLERANCE: f64 = 0.1;
 
 /// Tolerance of refits: windows, profiles, and starts of held-out logs.
 ///
-/// Unit: standard errors. Source: chosen.
+/// Unit: standard errors. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const REFIT_TOLERANCE: f64 = 0.05;
 
 /// Rows averaged into one equation of the regression, against noise in derivatives.
@@ -168,12 +169,12 @@ pub(crate) const REST_ROWS: f64 = 20.0;
 
 /// Widths of the Gaussian for derivatives of logs; the least that keeps to the permitted noise is taken.
 ///
-/// Unit: samples. Source: steps of about 4/3 and 3/2.
+/// Unit: samples. Source: steps of about 4/3 and 3/2. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const WIDTHS: [f64; 12] = [2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0];
 
 /// Widest of `WIDTHS` that a regression tries.
 ///
-/// Unit: samples. Source: chosen: beyond it a move is smeared.
+/// Unit: samples. Source: chosen: beyond it a move is smeared. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const WIDEST_IN_REGRESSION: f64 = 32.0;
 
 /// Noise permitted in the acceleration of a regression, relative to its root mean square.
@@ -190,37 +191,37 @@ pub(crate) const STRETCH: usize = 256;
 
 /// Half-width of the central 95 % of a normal distribution.
 ///
-/// Unit: standard deviations. Source: Φ⁻¹(0.975).
+/// Unit: standard deviations. Source: Φ⁻¹(0.975). Test: `limits_of_normal_deviates_are_theirs`.
 pub(crate) const NORMAL: f64 = 1.959_963_985;
 
 /// Ratio of neighbouring time constants in the grid of slow noises.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const TIME_RATIO: f64 = 2.2;
 
 /// Ratio of neighbouring powers in the grid of slow noises.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const POWER_RATIO: f64 = 3.0;
 
 /// Least power of a slow noise at low frequencies, relative to white noise.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const LEAST_POWER: f64 = 0.1;
 
 /// Number of powers in the grid of slow noises.
 ///
-/// Unit: 1. Source: chosen: 0.1 · 3¹³ = 1.6e5.
+/// Unit: 1. Source: chosen: 0.1 · 3¹³ = 1.6e5. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const MOST_POWERS: usize = 14;
 
 /// Prior probability of white noise.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const WHITE_BEFOREHAND: f64 = 0.3;
 
 /// Prior probability of two slow noises.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const TWO_BEFOREHAND: f64 = 0.35;
 
 /// Least ratio of the time constants of two slow noises, as a logarithm.
@@ -245,7 +246,8 @@ pub(crate) const SWINGS_IN_LOG: f64 = 5.0;
 
 /// Greatest frequency of noise that swings.
 ///
-/// Unit: rad between two blocks. Source: chosen: little below two blocks in a period.
+/// Unit: rad between two blocks. Source: chosen: little below two blocks in a period. Test:
+/// `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const SWING_FASTEST: f64 = 3.0;
 
 /// Ratio of neighbouring frequencies that are tried.
@@ -312,7 +314,7 @@ pub(crate) const WAVES: usize = 3;
 
 /// Least amplitude of a wave: rounding alone makes waves of 1/π steps.
 ///
-/// Unit: steps of the converter. Source: above 1/π.
+/// Unit: steps of the converter. Source: above 1/π. Test: `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const ROUNDED: f64 = 0.5;
 
 /// Least amplitude of a wave, as a share of the range of its quantity.
@@ -332,7 +334,7 @@ pub(crate) const SLOW_NOISES: usize = 2;
 
 /// Least number of waves in the travel: an error that does not repeat is one of a law, not of a place.
 ///
-/// Unit: waves. Source: chosen.
+/// Unit: waves. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const FEWEST_WAVES: f64 = 2.0;
 
 /// Share of the travel that must be passed in both directions: the error of a law changes with the direction, that of a
@@ -343,7 +345,8 @@ pub(crate) const BOTH_WAYS: f64 = 0.5;
 
 /// Step of the wave numbers that are tried.
 ///
-/// Unit: waves in the travel. Source: chosen: half of what can be resolved.
+/// Unit: waves in the travel. Source: chosen: half of what can be resolved. Test:
+/// `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const WAVE_STEP: f64 = 0.5;
 
 /// Maximum number of wave numbers that are tried.
@@ -427,7 +430,8 @@ pub(crate) const WHOLE_POWER: f64 = 0.03;
 
 /// Residuals within this multiple of the noise end the search for a start.
 ///
-/// Unit: 1. Source: chosen: the noise is by third differences, and is not known to a few per cent.
+/// Unit: 1. Source: chosen: the noise is by third differences, and is not known to a few per cent. Test:
+/// `limits_are_in_order`.
 pub(crate) const MORE_THAN_NOISE: f64 = 1.2;
 
 /// Residuals of an axis beyond this multiple of the noise are reported where no missing element explains them.
@@ -456,12 +460,12 @@ pub(crate) const FIRST_BEGINNING: f64 = 1.5;
 
 /// Least length of that part.
 ///
-/// Unit: share of the logs. Source: chosen.
+/// Unit: share of the logs. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const SHORTEST_BEGINNING: f64 = 0.01;
 
 /// Rows that such a beginning has at least.
 ///
-/// Unit: samples. Source: chosen.
+/// Unit: samples. Source: chosen. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const LEAST_ROWS: usize = 20;
 
 /// Lengths of the windows that a search of a machine with several coordinates begins in, one after the other.
@@ -472,12 +476,13 @@ pub(crate) const START_WINDOWS: [f64; 3] = [20.0, 60.0, 180.0];
 
 /// Most windows that a search begins in; longer logs have longer ones.
 ///
-/// Unit: windows. Source: chosen: each has a start of its own, and the work grows with their square.
+/// Unit: windows. Source: chosen: each has a start of its own, and the work grows with their square. Test:
+/// `limits_are_in_order`.
 pub(crate) const MOST_START_WINDOWS: f64 = 60.0;
 
 /// Least number of windows that are compared with the whole logs.
 ///
-/// Unit: windows. Source: chosen.
+/// Unit: windows. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const FEWEST_WINDOWS: f64 = 6.0;
 
 /// Least length of a window that is compared with the whole logs.
@@ -492,12 +497,12 @@ pub(crate) const COLOURED: f64 = 1.1;
 
 /// Deviation of the windows from the whole logs, and from each other, above which they disagree.
 ///
-/// Unit: standard errors. Source: chosen: 2 % of normal deviates.
+/// Unit: standard errors. Source: chosen: 2 % of normal deviates. Test: `limits_of_normal_deviates_are_theirs`.
 pub(crate) const WINDOWS_OFF: f64 = 2.3;
 
 /// ε: relative growth of the cost that a round towards the nearest point may make.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const COST_GROWTH: f64 = 3e-3;
 
 /// Maximum rounds towards the nearest point.
@@ -518,7 +523,7 @@ pub(crate) const NEAREST_ALL: f64 = 0.99;
 
 /// Maximum Jacobians of a round towards the nearest point.
 ///
-/// Unit: Jacobians. Source: chosen.
+/// Unit: Jacobians. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const NEAREST_ITERATIONS: usize = 40;
 
 /// The same for the single try after a search by differences whose residuals are far above the noise: what the model
@@ -535,17 +540,17 @@ pub(crate) const STRIBECK_SHARES: [f64; 4] = [0.02, 0.06, 0.18, 0.5];
 
 /// First amplitude of another law, relative to Coulomb friction.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const LAW_FIRST: f64 = 0.2;
 
 /// Least amplitude of another law, relative to Coulomb friction.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const LAW_LEAST: f64 = 0.01;
 
 /// Greatest amplitude of another law, relative to Coulomb friction.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const LAW_MOST: f64 = 3.0;
 
 /// Amplitude from which on another law is reported.
@@ -602,12 +607,12 @@ pub(crate) const OPPOSITE: f64 = -0.5;
 
 /// Longest delay of an input that is searched for.
 ///
-/// Unit: samples. Source: chosen; below `INPUT_BEFORE_WINDOW`.
+/// Unit: samples. Source: chosen; below `INPUT_BEFORE_WINDOW`. Test: `limits_are_in_order`.
 pub(crate) const LONGEST_DELAY: isize = 40;
 
 /// Shortest delay of an input that is tested.
 ///
-/// Unit: samples. Source: chosen.
+/// Unit: samples. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const SHORTEST_DELAY: isize = 2;
 
 /// Longest shift of an input against the outputs that is searched for.
@@ -622,12 +627,12 @@ pub(crate) const SHIFT_SHARE: f64 = 0.25;
 
 /// Distance of the shifts that are tried first.
 ///
-/// Unit: samples. Source: chosen: shorter than an input holds its values.
+/// Unit: samples. Source: chosen: shorter than an input holds its values. Test: `limits_are_in_order`.
 pub(crate) const SHIFT_STRIDE: isize = 5;
 
 /// Least unexplained torque for the search for a shift.
 ///
-/// Unit: 1. Source: chosen: an input with more than a delay leaves more.
+/// Unit: 1. Source: chosen: an input with more than a delay leaves more. Test: `limits_are_in_order`.
 pub(crate) const SHIFT_UNEXPLAINED: f64 = 0.25;
 
 /// Unexplained torque with a shift, relative to that without, below which the shift is tested.
@@ -642,7 +647,7 @@ pub(crate) const SUSPECT_DELAY: f64 = 0.95;
 
 /// Numbers of windows that the longest log is cut into where the whole is not explained.
 ///
-/// Unit: windows. Source: steps of 4.
+/// Unit: windows. Source: steps of 4. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const UNEXPLAINED_WINDOWS: [f64; 3] = [4.0, 16.0, 64.0];
 
 /// Explained share of the windows, beyond a straight line in each, from which on errors add up along the log.
@@ -652,7 +657,7 @@ pub(crate) const WINDOWS_EXPLAIN: f64 = 0.8;
 
 /// Entries of the Jacobian up to which windows are tried.
 ///
-/// Unit: values. Source: chosen: 160 MB.
+/// Unit: values. Source: chosen: 160 MB. Test: `limits_of_memory_are_what_they_say`.
 pub(crate) const WINDOWS_MOST: usize = 20_000_000;
 
 /// Residuals relative to the noise of the logs up to which no part of a log is looked for that the machine does not
@@ -673,7 +678,7 @@ pub(crate) const INTERRUPTED: f64 = 6.0;
 
 /// Residuals of all other windows relative to the usual ones: with more, windows differ in general.
 ///
-/// Unit: 1. Source: chosen: half of [`INTERRUPTED`].
+/// Unit: 1. Source: chosen: half of [`INTERRUPTED`]. Test: `limits_are_in_order`.
 pub(crate) const UNINTERRUPTED: f64 = 3.0;
 
 /// Share of the windows that such a part may have.
@@ -683,7 +688,7 @@ pub(crate) const INTERRUPTED_SHARE: f64 = 0.25;
 
 /// Least size of usual residuals, relative to the noise of the logs.
 ///
-/// Unit: 1. Source: chosen: noise by third differences is not known better.
+/// Unit: 1. Source: chosen: noise by third differences is not known better. Test: `limits_are_in_order`.
 pub(crate) const LEAST_INTERRUPTED: f64 = 1.5;
 
 /// Factors that are tried on a column where the model explains little: powers of ten, those of wrong pulleys, counts and
@@ -737,7 +742,7 @@ pub(crate) const MENDED: f64 = 0.5;
 /// The cost of all values may then be, relative to that of the log as it is: of two columns that contradict each other,
 /// a fit may have left one alone.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const NO_WORSE: f64 = 1.05;
 
 /// A unit counts as wrong unless the cost grows by this factor with the log corrected: free parameters may make up for
@@ -748,12 +753,12 @@ pub(crate) const UNIT_WORSE: f64 = 2.0;
 
 /// Mean square residual of samples that are said to be wrong, relative to that of the others where these do not count.
 ///
-/// Unit: 1. Source: three standard deviations, squared.
+/// Unit: 1. Source: three standard deviations, squared. Test: `limits_of_normal_deviates_are_theirs`.
 pub(crate) const STAND_OUT: f64 = 9.0;
 
 /// Share of a jump of a measured position that the motion of the fitted model has to leave for it to be one.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const JUMP: f64 = 0.5;
 
 /// Maximum Jacobians of the fit to a corrected log.
@@ -811,7 +816,8 @@ pub const R_HAT: f64 = 1.01;
 
 /// Effective draws below which a posterior does not count as converged.
 ///
-/// Unit: draws. Source: A. Vehtari and others 2021: 100 for each of four chains.
+/// Unit: draws. Source: A. Vehtari and others 2021: 100 for each of four chains. Test:
+/// `limits_of_memory_are_what_they_say`.
 pub const EFFECTIVE: f64 = 400.0;
 
 /// Share of divergent transitions that is not reported.
@@ -883,7 +889,8 @@ pub(crate) const WALK_STEPS: usize = 3;
 
 /// Length of a step of a random walk, times √n.
 ///
-/// Unit: standard deviations. Source: A. Gelman, G. O. Roberts, W. R. Gilks 1996.
+/// Unit: standard deviations. Source: A. Gelman, G. O. Roberts, W. R. Gilks 1996. Test:
+/// `limits_of_memory_are_what_they_say`.
 pub(crate) const WALK_LENGTH: f64 = 2.38;
 
 /// Best acceptance of a random walk in many variables.
@@ -893,29 +900,29 @@ pub(crate) const WALK_TAKEN: f64 = 0.234;
 
 /// Added to it in one variable: 0.44 together.
 ///
-/// Unit: 1. Source: A. Gelman, G. O. Roberts, W. R. Gilks 1996.
+/// Unit: 1. Source: A. Gelman, G. O. Roberts, W. R. Gilks 1996. Test: `limits_of_memory_are_what_they_say`.
 pub(crate) const WALK_TAKEN_OF_ONE: f64 = 0.206;
 
 // compare: laws and windows
 
 /// Number of logs from which on whole logs are held out; fewer are cut into blocks.
 ///
-/// Unit: logs. Source: chosen.
+/// Unit: logs. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const FEWEST_LOGS: usize = 4;
 
 /// Maximum number of parts that are held out in turn.
 ///
-/// Unit: parts. Source: usual (L. Breiman, P. Spector 1992).
+/// Unit: parts. Source: usual (L. Breiman, P. Spector 1992). Test: `limits_are_in_order`.
 pub(crate) const FOLDS: usize = 5;
 
 /// Blocks into which a log is cut where there are few.
 ///
-/// Unit: blocks. Source: chosen.
+/// Unit: blocks. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const LOG_BLOCKS: usize = 4;
 
 /// Least length of such a block: errors add up along it as along a log.
 ///
-/// Unit: samples. Source: chosen.
+/// Unit: samples. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const BLOCK_SAMPLES: usize = 60;
 
 /// Relative excess over the least sum of squares up to which a change explains a drift as well.
@@ -940,17 +947,17 @@ pub(crate) const STEPS_IN_PART: usize = 10;
 
 /// Points of a friction or force along the travel.
 ///
-/// Unit: points. Source: chosen.
+/// Unit: points. Source: chosen. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const TRAVEL_POINTS: usize = 7;
 
 /// Speeds of the points of a force by speed, relative to the greatest.
 ///
-/// Unit: 1. Source: chosen: closer near rest.
+/// Unit: 1. Source: chosen: closer near rest. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const SPEED_POINTS: [f64; 7] = [-1.0, -0.5, -0.125, 0.0, 0.125, 0.5, 1.0];
 
 /// Excess of static over Coulomb friction at which the search for a Stribeck curve begins.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const STRIBECK_ABOVE: f64 = 0.2;
 
 /// Greatest breakaway friction, relative to the Coulomb friction at which a search begins: where a log never rests, a
@@ -998,22 +1005,22 @@ pub(crate) const MOST_ROWS: f64 = 200_000.0;
 
 /// Points of each kind of input that are tried first.
 ///
-/// Unit: points. Source: chosen.
+/// Unit: points. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const FIRST_POINTS: usize = 16;
 
 /// Kinds of input that are evaluated on doubtful machines in the end.
 ///
-/// Unit: kinds. Source: chosen.
+/// Unit: kinds. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const FINALISTS: usize = 3;
 
 /// Generations without a gain after which the evolution of an input ends.
 ///
-/// Unit: generations. Source: chosen.
+/// Unit: generations. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const DESIGN_BARREN: usize = 6;
 
 /// Mean relative error of a kind after its first points, relative to the best, up to which it is searched.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const HOPEFUL: f64 = 1.6;
 
 /// First step size of the evolution of an input.
@@ -1023,12 +1030,12 @@ pub(crate) const FIRST_SIGMA: f64 = 0.7;
 
 /// Largest number of evaluations by the evolution strategy, for each kind, and again for the best.
 ///
-/// Unit: evaluations. Source: chosen.
+/// Unit: evaluations. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const MOST_VALUES: usize = 60;
 
 /// Highest frequency of an input, relative to the sample rate.
 ///
-/// Unit: 1. Source: chosen: ten samples a period.
+/// Unit: 1. Source: chosen: ten samples a period. Test: `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const OF_RATE: f64 = 0.1;
 
 /// Highest frequency of an input, in periods of the experiment.
@@ -1093,7 +1100,7 @@ pub(crate) const CAUSES_FITTED: usize = 16;
 
 /// Starts of one element that are fitted whole.
 ///
-/// Unit: starts. Source: chosen: the nearest does not always lead to the least.
+/// Unit: starts. Source: chosen: the nearest does not always lead to the least. Test: `limits_are_in_order`.
 pub(crate) const STARTS_FITTED: usize = 3;
 
 /// Starts of elements of a machine of several coordinates that take steps, in the order of their predicted costs.
@@ -1130,12 +1137,12 @@ pub(crate) const CAUSE_SETTLES: f64 = 0.9;
 
 /// Most values of logs for which elements are tried.
 ///
-/// Unit: values. Source: chosen: bounds the time.
+/// Unit: values. Source: chosen: bounds the time. Test: `limits_of_memory_are_what_they_say`.
 pub(crate) const CAUSE_MOST_VALUES: usize = 100_000;
 
 /// Most values of logs for which bristles are tried, whose runs have no exact derivatives.
 ///
-/// Unit: values. Source: chosen: bounds the time.
+/// Unit: values. Source: chosen: bounds the time. Test: `limits_of_memory_are_what_they_say`.
 pub(crate) const CAUSE_MOST_CURVED: usize = 20_000;
 
 /// Most steps of one simulation of all logs with an element whose runs have no exact derivatives.
@@ -1151,7 +1158,7 @@ pub(crate) const HELD_OUT_SHOWS: f64 = 0.5;
 
 /// Step of the variables over which estimates with an element are differentiated.
 ///
-/// Unit: 1. Source: the third root of rounding.
+/// Unit: 1. Source: the third root of rounding. Test: `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const CAUSE_DIFFERENCE: f64 = 1e-5;
 
 /// Frequencies of a spring between motor and cart that are tried.
@@ -1161,12 +1168,13 @@ pub(crate) const CAUSE_SPRINGS: [f64; 5] = [5.0, 10.0, 20.0, 40.0, 80.0];
 
 /// Damping ratio with which a spring begins.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const SPRING_DAMPING: f64 = 0.05;
 
 /// Sizes of play that are tried.
 ///
-/// Unit: standard deviations of the residuals. Source: steps of 2: other starts end in other minima.
+/// Unit: standard deviations of the residuals. Source: steps of 2: other starts end in other minima. Test:
+/// `what_is_tried_covers_what_lies_between`.
 pub(crate) const CAUSE_GAPS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
 
 /// Lengths by which bristles bend that are tried.
@@ -1177,12 +1185,12 @@ pub(crate) const CAUSE_BENDS: [f64; 3] = [0.06, 0.25, 1.0];
 
 /// Frequency and damping ratio of the flanks of play.
 ///
-/// Unit: Hz. Source: chosen: far above what a log shows.
+/// Unit: Hz. Source: chosen: far above what a log shows. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const FLANK_FREQUENCY: f64 = 150.0;
 
 /// Damping ratio of the flanks of play.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const FLANK_DAMPING: f64 = 0.5;
 
 /// Widths of the play of a sensor that are tried.
@@ -1198,7 +1206,7 @@ pub(crate) const SENSOR_START: f64 = 0.2887;
 
 /// Delays that are tried.
 ///
-/// Unit: intervals between samples. Source: chosen: one of either sign.
+/// Unit: intervals between samples. Source: chosen: one of either sign. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const CAUSE_DELAYS: [f64; 2] = [0.5, -0.5];
 
 /// Delays from which elements of gantries begin in windows, where either leads to either sign.
@@ -1213,7 +1221,8 @@ pub(crate) const CAUSE_LIMITS: [f64; 5] = [0.4, 0.52, 0.64, 0.76, 0.88];
 
 /// Lower bound of such a limit.
 ///
-/// Unit: as there. Source: chosen: an amplifier that gives less is another cause.
+/// Unit: as there. Source: chosen: an amplifier that gives less is another cause. Test:
+/// `what_is_tried_covers_what_lies_between`.
 pub(crate) const CAUSE_LEAST_LIMIT: f64 = 0.1;
 
 /// Inputs of a drive that tell a limit from a factor: above this share of the greatest, and below the next.
@@ -1223,7 +1232,7 @@ pub(crate) const LEVEL_LEAST: f64 = 0.05;
 
 /// The upper end of these.
 ///
-/// Unit: as there. Source: chosen.
+/// Unit: as there. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const LEVEL_MOST: f64 = 0.9;
 
 /// Breakaway with which a missing one begins.
@@ -1233,7 +1242,7 @@ pub(crate) const BREAKAWAY_FIRST: f64 = 1.3;
 
 /// Lower bound of a breakaway; below Coulomb friction it has no effect.
 ///
-/// Unit: Coulomb friction. Source: chosen.
+/// Unit: Coulomb friction. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const LEAST_BREAKAWAY: f64 = 0.5;
 
 /// Electrical time constants that are tried.
@@ -1248,12 +1257,12 @@ pub(crate) const APART_MOST: usize = 8;
 
 /// Share of the inertia with which a part before a spring or play begins.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const CAUSE_SHARE: f64 = 0.35;
 
 /// Least share of the inertia for which the case is taken to contain the rotor.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const KNOWN_SHARE: f64 = 0.05;
 
 /// Change of an estimate with an element from which on it is reported.
@@ -1268,7 +1277,7 @@ pub(crate) const SWINGS_KEEP: f64 = 0.1;
 
 /// Cost with an element after its first steps, relative to that without, up to which it is fitted whole.
 ///
-/// Unit: 1. Source: chosen: what is further off does not get there.
+/// Unit: 1. Source: chosen: what is further off does not get there. Test: `limits_are_in_order`.
 pub(crate) const CAUSE_NEAR: f64 = 3.0;
 
 /// Most that a fit with an element may gain, in whole steps of the linear model: beyond its first steps, or, with
@@ -1285,7 +1294,7 @@ pub(crate) const CAUSE_SLOW: f64 = 0.01;
 
 /// Steps in which a fit has to progress.
 ///
-/// Unit: steps. Source: chosen.
+/// Unit: steps. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const CAUSE_SLOW_STEPS: usize = 4;
 
 /// Factors on a number of a drive between which it is searched.
@@ -1305,42 +1314,44 @@ pub(crate) const YAW_STIFFNESS: [f64; 2] = [1.0, 8.0];
 
 /// Distance of the belts of a bridge whose yaw is tried. Its yaw stiffness at the belts does not depend on it.
 ///
-/// Unit: m. Source: that of the example in the table of parameters.
+/// Unit: m. Source: that of the example in the table of parameters. Test: `limits_are_in_order`.
 pub(crate) const YAW_SPACING: f64 = 0.5;
 
 /// Distance of the bearings of such a bridge.
 ///
-/// Unit: m. Source: as above.
+/// Unit: m. Source: as above. Test: `limits_are_in_order`.
 pub(crate) const YAW_BEARINGS: f64 = 0.06;
 
 /// Bounds of the size of an element, relative to its start.
 ///
-/// Unit: 1. Source: chosen: starts are 2 to 4 times apart.
+/// Unit: 1. Source: chosen: starts are 2 to 4 times apart. Test: `what_is_tried_covers_what_lies_between`.
 pub(crate) const CAUSE_AROUND: [f64; 2] = [0.1, 10.0];
 
 /// Bounds of the share of the inertia before a spring or play.
 ///
-/// Unit: 1. Source: chosen: less is not visible, and takes long to simulate.
+/// Unit: 1. Source: chosen: less is not visible, and takes long to simulate. Test: `limits_are_in_order`.
 pub(crate) const KNOWN_SHARES: [f64; 2] = [0.05, 0.95];
 
 /// First size of a force on the cart that is tried.
 ///
-/// Unit: the motor's force at the greatest input. Source: chosen.
+/// Unit: the motor's force at the greatest input. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const FORCE_FIRST: f64 = 0.01;
 
 /// Points of a drag over the speed.
 ///
-/// Unit: points. Source: straight lines are then within 0.3 % of the greatest drag.
+/// Unit: points. Source: straight lines are then within 0.3 % of the greatest drag. Test:
+/// `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const DRAG_POINTS: usize = 21;
 
 /// Points of friction that falls with speed, on either side of zero.
 ///
-/// Unit: Stribeck velocities. Source: 0.2 % of the fall is left at the last.
+/// Unit: Stribeck velocities. Source: 0.2 % of the fall is left at the last. Test:
+/// `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const STRIBECK_POINTS: [f64; 9] = [0.2, 0.4, 0.6, 0.8, 1.0, 1.25, 1.5, 2.0, 2.5];
 
 /// Greatest size of a force on the cart that has one sign, relative to its first.
 ///
-/// Unit: 1. Source: chosen: a hundred times the motor's greatest force.
+/// Unit: 1. Source: chosen: a hundred times the motor's greatest force. Test: `limits_are_in_order`.
 pub(crate) const FORCE_MOST: f64 = 1e4;
 
 /// Step to which an estimate is rounded in a file.
@@ -1351,7 +1362,8 @@ pub(crate) const DIGITS_KNOWN: f64 = 0.1;
 
 /// Rounding of numbers that go through text.
 ///
-/// Unit: relative. Source: sums and units of 64-bit numbers; a wrong form of a parameter is further off.
+/// Unit: relative. Source: sums and units of 64-bit numbers; a wrong form of a parameter is further off. Test:
+/// `limits_are_in_order`.
 pub(crate) const DIGITS_READ: f64 = 1e-9;
 
 // map: the force along the travel
@@ -1364,12 +1376,13 @@ pub(crate) const MAP_FALSE_ALARM: f64 = 0.01;
 
 /// Wave numbers that are tried per reciprocal of the mapped travel.
 ///
-/// Unit: 1. Source: chosen: between two of them a peak loses 5 % of its power.
+/// Unit: 1. Source: chosen: between two of them a peak loses 5 % of its power. Test:
+/// `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const MAP_RASTER: f64 = 4.0;
 
 /// Steps of the golden section that finds the top of a peak.
 ///
-/// Unit: steps. Source: 1e-3 of the raster is left.
+/// Unit: steps. Source: 1e-3 of the raster is left. Test: `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const MAP_SECTIONS: usize = 15;
 
 /// Rounds in which wave numbers are refined one after the other.
@@ -1380,7 +1393,8 @@ pub(crate) const MAP_ROUNDS: usize = 3;
 /// Neighbours on either side, at distances of the reciprocal of the mapped travel, from which the noise at a wave
 /// number is estimated, too.
 ///
-/// Unit: 1. Source: chosen: ten degrees of freedom from two passes.
+/// Unit: 1. Source: chosen: ten degrees of freedom from two passes. Test:
+/// `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const MAP_NEIGHBOURS: i32 = 2;
 
 /// Most periodic components.
@@ -1390,7 +1404,7 @@ pub(crate) const MAP_WAVES: usize = 8;
 
 /// Least periods within the mapped travel of what is called periodic.
 ///
-/// Unit: periods. Source: chosen: each half of the travel has to show one.
+/// Unit: periods. Source: chosen: each half of the travel has to show one. Test: `limits_are_in_order`.
 pub(crate) const MAP_PERIODS: f64 = 2.0;
 
 /// Least amplitude of a sine of a map.
@@ -1405,7 +1419,7 @@ pub(crate) const MAP_INFLATION: f64 = 3.0;
 
 /// Least amplitude of a periodic component in each half of the travel, relative to that in all of it.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const MAP_HALF: f64 = 0.4;
 
 /// Difference of wave numbers up to which a period matches one of the machine, where the noise makes it no larger.
@@ -1425,12 +1439,12 @@ pub(crate) const MAP_LOSS: f64 = 0.1;
 
 /// Speed at which a pass begins and ends.
 ///
-/// Unit: median speed of the pass. Source: chosen.
+/// Unit: median speed of the pass. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const MAP_SPEED: f64 = 0.5;
 
 /// Least length of a pass.
 ///
-/// Unit: that of the longest. Source: chosen.
+/// Unit: that of the longest. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const MAP_LENGTH: f64 = 0.8;
 
 /// Least rows of a pass for each point.
@@ -1440,7 +1454,7 @@ pub(crate) const MAP_ROWS: usize = 4;
 
 /// Least points of a map.
 ///
-/// Unit: points. Source: chosen.
+/// Unit: points. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const MAP_POINTS: usize = 16;
 
 /// Degrees of freedom of the residuals of a pass, relative to its points: neighbours share noise.
@@ -1450,5 +1464,8 @@ pub(crate) const MAP_FREEDOM: f64 = 0.25;
 
 /// Points on either side whose scatter is that of a point.
 ///
-/// Unit: points. Source: chosen.
+/// Unit: points. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const MAP_LOCAL: usize = 5;
+
+#[cfg(test)]
+mod tests;

@@ -370,6 +370,24 @@ impl<'a> Problem<'a> {
         self.parameters.len() + self.shared.len()
     }
 
+    /// Sets the variables of `x` that concern all runs to those of a point of another problem, which may share less.
+    pub(crate) fn take_globals(&self, x: &mut [f64], other: &Problem, theirs: &[f64]) {
+        let parameters = self.parameters.len();
+        x[..parameters].copy_from_slice(&theirs[..parameters]);
+        for (k, extra) in self.shared.iter().enumerate() {
+            if let Some(j) = other.shared.iter().position(|own| own.what == extra.what) {
+                x[parameters + k] = theirs[parameters + j];
+            }
+        }
+    }
+
+    /// Indices of the variables that are delays.
+    pub(crate) fn delays(&self) -> Vec<usize> {
+        let own = self.runs.iter().flat_map(variable_extras);
+        let extras = self.shared.iter().chain(own).zip(self.parameters.len()..);
+        extras.filter(|(extra, _)| matches!(extra.what, Nuisance::Delay(_))).map(|(_, index)| index).collect()
+    }
+
     /// Number of values that count.
     pub fn counted(&self) -> usize {
         self.runs.iter().flat_map(|run| &run.seen).flat_map(|seen| &seen.weights).filter(|w| **w > 0.0).count()

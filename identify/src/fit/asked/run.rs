@@ -442,6 +442,15 @@ impl FittedLog {
         Experiment { inputs, initial, until: self.until, every: self.every, ..empty() }
     }
 
+    /// Delays all inputs that were sampled by as much more, s.
+    pub(crate) fn delay_inputs(&mut self, by: f64) {
+        for input in &mut self.inputs {
+            if let Signal::Sampled { times, .. } = input {
+                *times = times.iter().map(|time| time + by).collect();
+            }
+        }
+    }
+
     /// Delay of the input of a drive, s; `None` if none is fitted.
     pub(crate) fn delay(&self, drive: usize, extras: &[f64]) -> Option<f64> {
         let delays = [None, Some(drive)].map(|of| self.extra(Nuisance::Delay(of), extras));

@@ -4,7 +4,7 @@ use super::least_squares::minimise;
 use super::point::{Ending, Minimum, Options};
 use super::regression::regression;
 use super::triangle::inverse_of_square;
-use crate::case::{Case, Plan};
+use crate::case::{Case, Nuisances, Plan, Scope};
 use crate::chance;
 use crate::error::{Error, Result};
 use crate::fit::asked::problem::{Problem, Stop, extent};
@@ -280,8 +280,8 @@ fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
 /// A search of a problem from a point.
 type Descend<'d> = dyn FnMut(&mut Problem, &[f64], &Options) -> Minimum + 'd;
 
-/// Start values of the case or of a regression; for a stepper, of fits to the beginnings of its logs; for several
-/// coordinates, of fits in short windows: whichever fits the logs better.
+/// Start values of the case or of a regression, with delays after fits that hold them; for a stepper, of fits to the
+/// beginnings of its logs; for several coordinates, of fits in short windows: whichever fits the logs better.
 fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut Descend) -> Result<Vec<f64>> {
     let start = problem.start();
     let guess = match &problem.machine {
@@ -289,12 +289,60 @@ fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut De
         machine if machine.stepper().is_some() => Some(by_beginnings(case, plan, problem, &start, descend)?),
         _ => in_windows(case, plan, problem, &start, descend)?,
     };
-    let Some(guess) = guess else { return Ok(start) };
+    let guess = ranked(problem, [start].into_iter().chain(guess)).swap_remove(0);
+    match problem.machine.has_torque_balance() && plan.nuisance.delay != Scope::Off {
+        true => with_delays(case, plan, problem, guess, descend),
+        false => Ok(guess),
+    }
+}
+
+/// Points in the order of their costs; of equal ones the first comes first.
+fn ranked(problem: &mut Problem, points: impl IntoIterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
     let mut residuals = vec![0.0; problem.rows()];
-    let mut cost = |x: &[f64]| {
-        if problem.evaluate(x, &mut residuals) { residuals.iter().map(|r| r * r).sum() } else { f64::INFINITY }
+    let mut cost = |x: Vec<f64>| match problem.evaluate(&x, &mut residuals) {
+        true => (residuals.iter().map(|r| r * r).sum::<f64>(), x),
+        false => (f64::INFINITY, x),
     };
-    Ok(if cost(&guess) < cost(&start) { guess } else { start })
+    let mut ranked: Vec<_> = points.into_iter().map(&mut cost).collect();
+    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
+    ranked.into_iter().map(|(_, x)| x).collect()
+}
+
+/// Start with delays: parameters are fitted with all inputs late, or early, by half an interval between samples, then by
+/// one and a half and so on, as long as that fits the logs better.
+///
+/// Inputs are held between samples, so that the current of a motor without inductance jumps, and with it the cost
+/// wherever a delay passes a whole interval. A search of all together that began with wrong parameters ended there.
+fn with_delays(
+    case: &Case,
+    plan: &Plan,
+    problem: &mut Problem,
+    start: Vec<f64>,
+    descend: &mut Descend,
+) -> Result<Vec<f64>> {
+    let undelayed = Plan { nuisance: Nuisances { delay: Scope::Off, ..plan.nuisance }, ..plan.clone() };
+    let interval = problem.runs[0].interval();
+    let mut fitted = |intervals: f64, problem: &mut Problem, from: &[f64]| -> Result<Option<(f64, f64, Vec<f64>)>> {
+        let mut other = Problem::new(case, &undelayed)?.stopped_by(problem.stop());
+        other.runs.iter_mut().for_each(|run| run.delay_inputs(intervals * interval));
+        let mut x = from.to_vec();
+        let cost = improve(other, problem, &mut x, descend);
+        Ok(cost.map(|cost| (cost, intervals, x)))
+    };
+    let [late, early] = [fitted(0.5, problem, &start)?, fitted(-0.5, problem, &start)?];
+    let first = late.into_iter().chain(early).min_by(|a, b| a.0.total_cmp(&b.0));
+    let Some(mut best) = first else { return Ok(start) };
+    let further = best.1.signum();
+    while !problem.is_stopped() {
+        match fitted(best.1 + further, problem, &best.2)? {
+            Some(next) if next.0 < best.0 => best = next,
+            _ => break,
+        }
+    }
+    let (_, intervals, mut x) = best;
+    let bounds = problem.bounds();
+    problem.delays().iter().for_each(|&j| x[j] = intervals.clamp(bounds.low[j], bounds.high[j]));
+    Ok(x)
 }
 
 /// Start from fits to successively longer beginnings of the logs.
@@ -315,7 +363,8 @@ fn by_beginnings(
     let slowest = modes.iter().map(|mode| mode.frequency).fold(f64::INFINITY, f64::min);
     let first = (FIRST_BEGINNING / slowest).max(end * SHORTEST_BEGINNING);
     for length in std::iter::successors(Some(first), |length| Some(2.0 * length)).take_while(|length| *length < end) {
-        improve(&beginning(case, length), &plan, problem, &mut guess, descend)?;
+        let other = Problem::new(&beginning(case, length), &plan)?.stopped_by(problem.stop());
+        improve(other, problem, &mut guess, descend);
         if problem.is_stopped() {
             break;
         }
@@ -328,20 +377,18 @@ fn rough() -> Options {
     Options { iterations: TRIAL_ITERATIONS, tolerance: ROUGH_TOLERANCE, evolutions: 0, ..Options::default() }
 }
 
-/// Updates the shared variables of `guess` by a rough search for another case or plan, which begins at it; false,
-/// without changes, if that fails.
-fn improve(case: &Case, plan: &Plan, problem: &mut Problem, guess: &mut [f64], descend: &mut Descend) -> Result<bool> {
-    let globals = problem.globals();
-    let mut other = Problem::new(case, plan)?.stopped_by(problem.stop());
+/// Updates the shared variables of `guess` by a rough search of another problem, which begins at it, and returns the
+/// cost; none, without changes, if that fails.
+fn improve(mut other: Problem, problem: &mut Problem, guess: &mut [f64], descend: &mut Descend) -> Option<f64> {
     let mut first = other.start();
-    first[..globals].copy_from_slice(&guess[..globals]);
+    other.take_globals(&mut first, problem, guess);
     let found = descend(&mut other, &first, &rough());
     problem.simulations += other.simulations;
-    let is_good = found.ending != Ending::Failed;
-    if is_good {
-        guess[..globals].copy_from_slice(&found.x[..globals]);
+    if found.ending == Ending::Failed {
+        return None;
     }
-    Ok(is_good)
+    problem.take_globals(guess, &other, &found.x);
+    Some(found.cost)
 }
 
 /// A case with the first part of its logs, s.
@@ -391,8 +438,8 @@ fn in_windows(
     let (mut guess, mut best) = (start.to_vec(), None);
     for length in std::iter::once(None).chain(START_WINDOWS.map(Some)) {
         if let Some(length) = length {
-            let windowed = windowed(plan, problem, length);
-            if !improve(case, &windowed, problem, &mut guess, descend)? {
+            let other = Problem::new(case, &windowed(plan, problem, length))?.stopped_by(problem.stop());
+            if improve(other, problem, &mut guess, descend).is_none() {
                 break;
             }
         }
@@ -430,7 +477,8 @@ pub(crate) fn end_in_windows<'a>(
 ) -> Option<InWindows<'a>> {
     let [short, plan, _] = START_WINDOWS.map(|samples| windowed(plan, problem, samples));
     let (mut guess, globals) = (start.to_vec(), problem.globals());
-    improve(case, &short, &mut problem.clone(), &mut guess, &mut roughly).ok().filter(|is_good| *is_good)?;
+    let other = Problem::new(case, &short).ok()?.stopped_by(problem.stop());
+    improve(other, &mut problem.clone(), &mut guess, &mut roughly)?;
     let mut problem = Problem::new(case, &plan).ok()?.stopped_by(problem.stop());
     let mut start = problem.start();
     start[..globals].copy_from_slice(&guess[..globals]);
