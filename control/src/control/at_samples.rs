@@ -6,6 +6,7 @@
 use super::figures::{Deviation, DriveFigures, Figures, LoadFigures, is_made};
 use super::outcome::{at_rest, each, unrecorded};
 use super::sampled::Loop;
+use super::sampled_path::SampledPath;
 use super::standard::Standard;
 use crate::error::Result;
 use crate::machine::{Machine, SlideAt};
@@ -20,16 +21,16 @@ pub(crate) fn closed_loop_at_samples(
     machine: &Machine,
     controllers: &mut [Standard],
     timing: &Loop,
-    profiles: &[Profile],
+    path: &SampledPath,
     (until, window): (f64, f64),
     solver: Solver,
 ) -> Result<(Figures, solve::Ending)> {
     timing.check(until)?;
-    let experiment = at_rest(machine, profiles, until, timing.every.min(until));
-    let mut gathered = Gathered::new(machine, profiles, window);
+    let experiment = at_rest(machine, path.profiles(), until, timing.every.min(until));
+    let mut gathered = Gathered::new(machine, path, window);
     let see = |time: f64, state: &State, currents: &[f64]| gathered.see(time, state, currents);
     let run = (machine, &experiment);
-    let outcome = unrecorded(run, &mut each(controllers), (timing, profiles), solver, None::<&mut Meter>, see)?;
+    let outcome = unrecorded(run, &mut each(controllers), (timing, path), solver, None::<&mut Meter>, see)?;
     Ok((gathered.finish(), outcome.ending))
 }
 
@@ -39,6 +40,9 @@ struct Gathered<'a> {
     /// End of the profiles, and the last sample, s.
     done: f64,
     last: Option<f64>,
+    /// Number of samples so far.
+    seen: usize,
+    path: &'a SampledPath,
     slides: Vec<OfSlide<'a>>,
     currents: Vec<Squared>,
 }
@@ -83,7 +87,8 @@ impl Squared {
 }
 
 impl<'a> Gathered<'a> {
-    fn new(machine: &Machine, profiles: &'a [Profile], window: f64) -> Self {
+    fn new(machine: &Machine, path: &'a SampledPath, window: f64) -> Self {
+        let profiles = path.profiles();
         let slide = |(profile, at): (&'a Profile, &SlideAt)| OfSlide {
             body: at.body,
             profile,
@@ -99,6 +104,8 @@ impl<'a> Gathered<'a> {
             window,
             done: Profile::last_end(profiles),
             last: None,
+            seen: 0,
+            path,
             slides: profiles.iter().zip(machine.geometry().slides).map(slide).collect(),
             currents: vec![Squared::default(); machine.drives.len()],
         }
@@ -107,9 +114,9 @@ impl<'a> Gathered<'a> {
     fn see(&mut self, time: f64, state: &State, currents: &[f64]) {
         let length = self.last.map(|before| time - before);
         self.currents.iter_mut().zip(currents).for_each(|(squared, current)| squared.see(*current, length));
-        for slide in &mut self.slides {
+        for (number, slide) in self.slides.iter_mut().enumerate() {
             let x = state.position[slide.body];
-            let error = x - slide.profile.at(time).position;
+            let error = x - self.path.position(self.seen, time, number);
             slide.reached = slide.reached.max((x - slide.profile.start()).abs());
             if error.abs() > slide.peak.value.abs() {
                 slide.peak = Peak { value: error, time };
@@ -126,7 +133,7 @@ impl<'a> Gathered<'a> {
             }
             (slide.error, slide.away) = (error, away);
         }
-        self.last = Some(time);
+        (self.last, self.seen) = (Some(time), self.seen + 1);
     }
 
     fn finish(self) -> Figures {

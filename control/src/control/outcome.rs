@@ -4,6 +4,7 @@ use super::figures::Figures;
 use super::gauge::{Gauge, read};
 use super::rest::Swing;
 use super::sampled::{Added, Controller, Loop, Sample};
+use super::sampled_path::SampledPath;
 use super::sampling::Sampled;
 use super::standard::Standard;
 use super::wide::Wide;
@@ -100,29 +101,31 @@ pub(crate) fn closed_loop_briefly(
     machine: &Machine,
     controllers: &mut [&mut dyn Controller],
     timing: &Loop,
-    profiles: &[Profile],
+    path: &SampledPath,
     (until, window): (f64, f64),
     solver: Solver,
 ) -> Result<(Figures, solve::Ending)> {
     timing.check(until)?;
+    let profiles = path.profiles();
     let experiment = at_rest(machine, profiles, until, timing.every.min(until));
     let mut gauge = Gauge::new(machine, &experiment, profiles, window).briefly();
     let outcome =
-        unrecorded((machine, &experiment), controllers, (timing, profiles), solver, Some(&mut gauge), |_, _, _| {})?;
+        unrecorded((machine, &experiment), controllers, (timing, path), solver, Some(&mut gauge), |_, _, _| {})?;
     Ok((gauge.finish(&outcome.events).0, outcome.ending))
 }
 
-/// Runs controllers along their profiles without rows; `see` gets the samples as in [`Sampled::drive`].
+/// Runs controllers along a path without rows; `see` gets the samples as in [`Sampled::drive`].
 pub(super) fn unrecorded(
     (machine, experiment): (&Machine, &Experiment),
     controllers: &mut [&mut dyn Controller],
-    (timing, profiles): (&Loop, &[Profile]),
+    (timing, path): (&Loop, &SampledPath),
     solver: Solver,
     observer: Option<&mut impl Observe>,
     see: impl FnMut(f64, &State, &[f64]),
 ) -> Result<solve::Outcome> {
     controllers.iter_mut().for_each(|controller| controller.reset());
-    let mut sampled = Sampled::new(machine, controllers, *timing, profiles, false).along(machine, experiment);
+    let sampled = Sampled::new(machine, controllers, *timing, path.profiles(), false).on(path);
+    let mut sampled = sampled.along(machine, experiment);
     let sink = &mut |_: &Trajectory| Flow::Continue;
     let observer = observer.map(|observer| observer as &mut dyn Observe);
     let run = solve::Run::reading(read(machine), experiment, solver, Detail::None, observer, sink)?;

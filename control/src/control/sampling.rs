@@ -1,13 +1,14 @@
 //! Controllers around a run: samples, commands and delays, decision by decision.
 
 use super::rest::Rest;
-use super::sampled::{Added, Controller, Loop, SLIDES, Sample};
-use super::stepped::{Clocked, Commands, Decision, References};
+use super::sampled::{Added, Controller, Loop, Sample};
+use super::sampled_path::{SampledPath, references};
+use super::stepped::{Clocked, Commands, Decision};
 use crate::case::Experiment;
 use crate::machine::Machine;
 use crate::mechanism::{DRIVES, State};
 use crate::signal::Signal;
-use crate::signal::profile::{Profile, Reference};
+use crate::signal::profile::Profile;
 use crate::solve::Run;
 
 /// Determines the inputs: samples, evaluates the controllers, limits the commands, and applies them after the delay.
@@ -15,6 +16,8 @@ pub(super) struct Sampled<'a, 'c> {
     controllers: &'a mut [&'c mut dyn Controller],
     /// Profile of each coordinate.
     profiles: &'a [Profile],
+    /// Their known references.
+    path: Option<&'a SampledPath>,
     clocked: Clocked,
     /// Last command of each drive.
     pub(super) told: [DriveCommands; DRIVES],
@@ -60,6 +63,7 @@ impl<'a, 'c> Sampled<'a, 'c> {
         Self {
             controllers,
             profiles,
+            path: None,
             clocked: Clocked::new(machine, timing),
             told: [DriveCommands::new(f64::INFINITY, f64::INFINITY); DRIVES],
             until: f64::INFINITY,
@@ -77,6 +81,12 @@ impl<'a, 'c> Sampled<'a, 'c> {
         self.until = experiment.until;
         self.told = [DriveCommands::new(self.profiles.first().map_or(0.0, Profile::end), self.until); DRIVES];
         self.references = if machine.stepper().is_some() { &experiment.inputs } else { &[] };
+        self
+    }
+
+    /// With the known references of its profiles.
+    pub(super) fn on(mut self, path: &'a SampledPath) -> Self {
+        self.path = Some(path).filter(|path| path.is_for(&self.clocked.timing));
         self
     }
 
@@ -141,8 +151,10 @@ impl Sampled<'_, '_> {
     fn decide(&mut self, state: &State, currents: &Commands) -> (Commands, f64) {
         let (every, lead) = (self.clocked.timing.every, self.clocked.timing.lead);
         let (time, before) = (self.clocked.next(), self.clocked.acting());
-        let profiles = self.profiles;
-        let references = |time: f64| references(profiles, time, lead);
+        let (profiles, path) = (self.profiles, self.path);
+        let references = |k: u64, time: f64| {
+            path.and_then(|path| path.references(k)).unwrap_or_else(|| references(profiles, time, lead))
+        };
         if let Some(decisions) = self.clocked.decide(self.controllers, (state, currents), references) {
             self.samples += 1;
             let mut is_limited = false;
@@ -170,15 +182,4 @@ impl Sampled<'_, '_> {
         }
         (acting, self.clocked.next())
     }
-}
-
-/// References of all slides at `time`, s, and one `lead` later, s.
-fn references(profiles: &[Profile], time: f64, lead: f64) -> References {
-    let at = |time: f64| {
-        let mut slides = [Reference::default(); SLIDES];
-        slides.iter_mut().zip(profiles).for_each(|(slide, profile)| *slide = profile.at(time));
-        slides
-    };
-    let now = at(time);
-    [now, if lead == 0.0 { now } else { at(time + lead) }]
 }

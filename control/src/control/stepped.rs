@@ -85,13 +85,14 @@ impl Clocked {
         self.acting = self.waiting.pop_front().unwrap_or_default();
     }
 
-    /// Decides at [`Clocked::next`] from the state and the motors' currents, A; `references` are required at a sample.
+    /// Decides at [`Clocked::next`] from the state and the motors' currents, A; `references` are required at a sample, by
+    /// its number and time, s.
     /// Returns the decision of each drive if that is a sample; a delayed command needs nothing.
     pub fn decide(
         &mut self,
         controllers: &mut [&mut dyn Controller],
         (state, currents): (&State, &Commands),
-        references: impl FnOnce(f64) -> References,
+        references: impl FnOnce(u64, f64) -> References,
     ) -> Option<[Decision; DRIVES]> {
         if self.halfway {
             self.halfway = false;
@@ -99,7 +100,7 @@ impl Clocked {
             return None;
         }
         let time = self.clock.times(self.k);
-        let [slides, later] = references(time);
+        let [slides, later] = references(self.k, time);
         let mut decisions = [Decision::default(); DRIVES];
         let mut given = [0.0; DRIVES];
         for (drive, controller) in controllers.iter_mut().enumerate() {
@@ -175,7 +176,7 @@ impl Stepped {
         let mut of_drives = Commands::default();
         of_drives.iter_mut().zip(currents).for_each(|(own, current)| *own = *current);
         let mut all: Vec<&mut dyn Controller> = self.controllers.iter_mut().map(|one| one as _).collect();
-        self.clocked.decide(&mut all, (state, &of_drives), |_| references);
+        self.clocked.decide(&mut all, (state, &of_drives), |_, _| references);
     }
 }
 

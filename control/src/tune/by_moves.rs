@@ -11,10 +11,10 @@ use super::watch::Watch;
 use super::work::{FINALISTS, Finalist, Work};
 use crate::case::{Cost, Move};
 use crate::chance::uniform;
+use crate::control::SampledPath;
 use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
-use crate::signal::profile::Profile;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 
@@ -75,24 +75,24 @@ const LOST: f64 = 0.2;
 impl Work<'_> {
     /// Figures of all moves on one machine.
     pub fn looked(&self, runner: &mut Runner, design: &Design, machine: &Machine) -> Result<Vec<MoveFigures>> {
-        let one = |(motion, shaped): (&Move, &Vec<Profile>)| {
+        let one = |(motion, path): (&Move, &SampledPath)| {
             self.spend(design, motion);
-            runner.look(machine, motion, shaped)
+            runner.look(machine, motion, path)
         };
-        self.moves.iter().zip(&self.shaped).map(one).collect()
+        self.moves.iter().zip(&self.paths).map(one).collect()
     }
 
     /// Figures of each move on all machines, from samples.
     pub fn glanced(&self, design: &Design) -> Result<Vec<Vec<MoveFigures>>> {
         let mut runner = Runner::new(&self.case.machine, design)?;
-        let mut of_move = |(motion, shaped): (&Move, &Vec<Profile>)| {
+        let mut of_move = |(motion, path): (&Move, &SampledPath)| {
             let one = |machine: &Machine| {
                 self.spend(design, motion);
-                runner.glance(machine, motion, shaped)
+                runner.glance(machine, motion, path)
             };
             self.stages.iter().map(one).collect::<Result<Vec<_>>>()
         };
-        self.moves.iter().zip(&self.shaped).map(&mut of_move).collect()
+        self.moves.iter().zip(&self.paths).map(&mut of_move).collect()
     }
 
     /// Worst-case figures of a design on the watched machines, from samples, and ln J by the balance of the search.
@@ -106,10 +106,10 @@ impl Work<'_> {
         let most = watch.axes.iter().map(Vec::len).max().unwrap_or_default();
         let mut value = f64::INFINITY;
         for rank in 0..most {
-            for (k, (motion, shaped)) in self.moves.iter().zip(&self.shaped).enumerate() {
+            for (k, (motion, path)) in self.moves.iter().zip(&self.paths).enumerate() {
                 let Some(&axis) = watch.axes[k].get(rank) else { continue };
                 self.spend(design, motion);
-                let Ok(one) = runner.glance(&self.stages[axis], motion, shaped) else { return nothing };
+                let Ok(one) = runner.glance(&self.stages[axis], motion, path) else { return nothing };
                 seen[k].push(one);
                 if seen[k].len() <= left_out && seen[k].len() < watch.axes[k].len() {
                     continue;

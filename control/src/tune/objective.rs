@@ -13,11 +13,12 @@
 //! within its window without having made the move (stuck during a reversal), e is its largest error.
 
 use crate::case::{Cost, Move};
-use crate::control::{Figures, LoadFigures, Loop, Standard, closed_loop_at_samples, closed_loop_briefly, each};
+use crate::control::{
+    Figures, LoadFigures, Loop, SampledPath, Standard, closed_loop_at_samples, closed_loop_briefly, each,
+};
 use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
-use crate::signal::profile::Profile;
 use crate::solve::{Ending, Solver};
 
 /// Weights of the figures: a_e, a_s, a_i.
@@ -58,7 +59,12 @@ pub struct MoveFigures {
 
 /// A move on one machine.
 pub fn look(machine: &Machine, model: &Machine, design: &Design, motion: &Move) -> Result<MoveFigures> {
-    Runner::new(model, design)?.look(machine, motion, &motion.references(design))
+    Runner::new(model, design)?.look(machine, motion, &path(motion, design))
+}
+
+/// The shaped profiles of a move, and their references at the samples of a design.
+pub(super) fn path(motion: &Move, design: &Design) -> SampledPath {
+    SampledPath::new(motion.references(design), Loop::new(design), motion.until)
 }
 
 /// A controller made once and run through many moves.
@@ -73,23 +79,23 @@ impl Runner {
         Ok(Self { controllers: Standard::of_drives(design, model)?, timing: Loop::new(design) })
     }
 
-    /// A move on one machine with a shaped profile.
-    pub fn look(&mut self, machine: &Machine, motion: &Move, shaped: &[Profile]) -> Result<MoveFigures> {
+    /// A move on one machine along its path.
+    pub fn look(&mut self, machine: &Machine, motion: &Move, path: &SampledPath) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
         let controllers = &mut each(&mut self.controllers);
         let (figures, ending) =
-            closed_loop_briefly(machine, controllers, &self.timing, shaped, seen, Solver::for_machine(machine))?;
+            closed_loop_briefly(machine, controllers, &self.timing, path, seen, Solver::for_machine(machine))?;
         Ok(figures_of(&figures, ending, motion))
     }
 
     /// Figures of a move at samples only, in a third of the time.
-    pub(crate) fn glance(&mut self, machine: &Machine, motion: &Move, shaped: &[Profile]) -> Result<MoveFigures> {
+    pub(crate) fn glance(&mut self, machine: &Machine, motion: &Move, path: &SampledPath) -> Result<MoveFigures> {
         let seen = (motion.until, motion.window);
         let (figures, ending) = closed_loop_at_samples(
             machine,
             &mut self.controllers,
             &self.timing,
-            shaped,
+            path,
             seen,
             Solver::for_machine(machine),
         )?;
@@ -209,9 +215,9 @@ mod tests {
             let design = case.controller.as_ref().unwrap();
             let mut runner = Runner::new(&case.machine, design).unwrap();
             for motion in &case.moves {
-                let shaped = motion.references(design);
-                let whole = runner.look(&case.machine, motion, &shaped).unwrap();
-                let glance = runner.glance(&case.machine, motion, &shaped).unwrap();
+                let path = path(motion, design);
+                let whole = runner.look(&case.machine, motion, &path).unwrap();
+                let glance = runner.glance(&case.machine, motion, &path).unwrap();
                 let told = format!("{name}: {}: {whole:?} {glance:?}", motion.name);
                 assert!(glance.error <= whole.error && glance.error > 0.98 * whole.error, "{told}");
                 assert!((glance.rms / whole.rms - 1.0).abs() < 0.02, "{told}");

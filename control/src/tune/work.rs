@@ -6,15 +6,16 @@ use super::gains::{self, rounded, searched, shaped};
 use super::hunting::Observed;
 use super::judged::Verdict;
 use super::margins::{Margins, Peaks, Rough};
+use super::objective::path;
 use super::plant::Plant;
 use super::rules::{layouts, starts};
 use super::search::minimise;
 use crate::case::{Case, Move, Tuning};
+use crate::control::SampledPath;
 use crate::control::feedback::Feedback;
 use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
-use crate::signal::profile::Profile;
 use std::cell::{Cell, RefCell};
 use std::f64::consts::PI;
 
@@ -50,8 +51,8 @@ pub(super) struct Work<'a> {
     pub moves: &'a [Move],
     /// I₀ of each move, A.
     pub asked: Vec<f64>,
-    /// The shaped moves; a search does not change the shaper.
-    pub shaped: Vec<Vec<Profile>>,
+    /// The paths of the shaped moves; a search does not change the shaper.
+    pub paths: Vec<SampledPath>,
     /// All machines of the family, steppers without microsteps, and their frequency responses for a controller.
     pub stages: Vec<Machine>,
     pub plants: Vec<Plant>,
@@ -112,7 +113,7 @@ impl<'a> Work<'a> {
             tuning,
             moves,
             asked,
-            shaped: moves.iter().map(|motion| motion.references(design)).collect(),
+            paths: moves.iter().map(|motion| path(motion, design)).collect(),
             stages: family.machines.iter().map(|machine| family.stage_at(machine).interpolating()).collect(),
             plants,
             set: vec![0],

@@ -86,6 +86,8 @@ pub(super) trait Between {
     fn transition(&self, index: usize) -> &Transition;
     /// Its value.
     fn known(&self, index: usize) -> Known;
+    /// The rounding error of its value.
+    fn noise_of(&self, index: usize) -> f64;
     /// Known terms of a condition at the beginning of a mode, whose time is known to rounding, too.
     fn known_at_begin(&self, index: usize) -> Known;
     /// Further tolerance for a condition that has just begun to hold: zero for a solver whose series show which
@@ -343,7 +345,7 @@ fn hold_part<B: Between>(solver: &mut B, cause: Cause) {
 fn widen_all_breakaways<B: Between>(solver: &mut B) {
     for index in 0..solver.conditions() {
         if let cause @ (Cause::BreakForward(_) | Cause::BreakBackward(_)) = solver.transition(index).cause {
-            let noise = solver.known(index).noise;
+            let noise = solver.noise_of(index);
             let tolerance = &mut solver.rules_mut().tolerance[cause.kind()];
             *tolerance = tolerance.max(NEAR * noise);
         }

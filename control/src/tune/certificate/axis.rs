@@ -5,7 +5,7 @@
 //! and lengths of spans. They are found by interpolation between machines: exact but for rounding. The degrees are
 //! found one by one, and random machines of the box confirm the result.
 
-use super::tensor::{Tensor, from_points, points};
+use super::tensor::{Tensor, from_points, next, points};
 use crate::chance::uniform;
 use crate::design::Design;
 use crate::error::Result;
@@ -186,14 +186,15 @@ impl<'a> Axis<'a> {
             return Ok(Err(format!("{} parameters at once are too many for it", axis.parameters.len())));
         }
         let all_points: Vec<Vec<f64>> = axis.polynomials.shape.iter().map(|size| points(size - 1)).collect();
+        let mut exponents = vec![0; axis.polynomials.shape.len()];
         for number in 0..count {
             if number % 64 == 0 && stop() {
                 return Ok(Err("interrupted".into()));
             }
-            let exponents = axis.polynomials.exponents(number);
             let point: Vec<f64> = exponents.iter().zip(&all_points).map(|(k, points)| points[*k]).collect();
             let Some(values) = at(&axis, &point)? else { return formless() };
             axis.polynomials.values.extend(values);
+            next(&mut exponents, &axis.polynomials.shape);
         }
         for parameter in 0..axis.parameters.len() {
             let degree = axis.polynomials.shape[parameter] - 1;

@@ -14,6 +14,7 @@
 //! Bernstein's coefficients.
 
 use super::axis::Axis;
+use super::forms::{Columns, Form, Numbers, Seen, Values, dot, parts};
 use super::jet::{Jet, modulus};
 use super::tensor::Tensor;
 use crate::control::feedback::Feedback;
@@ -39,44 +40,46 @@ const BEYOND: f64 = 1.0 + 1e-6;
 
 /// Polynomials over a box, in the form that cells need.
 pub(super) struct Table {
-    /// Channels in the middle of the box, and by how much they differ at most elsewhere.
-    center: Vec<f64>,
+    /// Channels in the middle of the box, and Bernstein's coefficients in most parameters as nodes, with linear and
+    /// quadratic terms with the others as minors.
+    values: Columns,
+    /// By how much channels differ at most from those in the middle.
     deviation: Vec<f64>,
     /// The same of all channels over the leading one of d.
     monic: Vec<f64>,
     monic_deviation: Vec<f64>,
     /// Terms linear in each parameter.
     linear: Vec<Vec<f64>>,
-    /// Linear and quadratic terms with parameters that are not in `nodes`, and the sum of all higher ones, at most.
-    terms: Vec<Vec<f64>>,
+    /// The sum of all higher terms, at most.
     mixed: Vec<f64>,
-    /// Bernstein's coefficients in all other parameters, with a mark for values that are attained at a corner.
-    nodes: Vec<f64>,
+    /// For each node, true if its value is attained at a corner.
     is_corner: Vec<bool>,
 }
 
 impl Table {
     pub fn new(polynomials: &Tensor, axis: &Axis) -> Self {
         let magnitudes = &axis.magnitudes;
-        let (channels, count) = (polynomials.channels, polynomials.count());
+        let channels = polynomials.channels;
         let size = polynomials.shape.len();
         let center = polynomials.channels_of(0).to_vec();
         let mut linear = vec![vec![0.0; channels]; size];
         let mut deviation = vec![0.0; channels];
         let mut mixing = vec![0.0; size];
-        for number in 1..count {
-            let exponents = polynomials.exponents(number);
-            let values = polynomials.channels_of(number);
+        polynomials.products(|exponents, values| {
+            let degree = exponents.iter().sum::<usize>();
+            if degree == 0 {
+                return;
+            }
             deviation.iter_mut().zip(values).for_each(|(sum, value)| *sum += value.abs());
-            if exponents.iter().sum::<usize>() == 1 {
+            if degree == 1 {
                 let parameter = exponents.iter().position(|power| *power == 1).unwrap_or_default();
                 linear[parameter] = values.to_vec();
-                continue;
+                return;
             }
             let relative = values.iter().zip(magnitudes).map(|(value, size)| value.abs() / size.max(f64::MIN_POSITIVE));
             let relative: f64 = relative.sum();
-            mixing.iter_mut().zip(&exponents).filter(|(_, power)| **power > 0).for_each(|(sum, _)| *sum += relative);
-        }
+            mixing.iter_mut().zip(exponents).filter(|(_, power)| **power > 0).for_each(|(sum, _)| *sum += relative);
+        });
         let mut order: Vec<usize> = (0..size).collect();
         order.sort_by(|&a, &b| mixing[b].total_cmp(&mixing[a]));
         let mut nodes = 1;
@@ -91,32 +94,35 @@ impl Table {
         let shape = (0..size).filter(|&parameter| is_major[parameter]).map(|parameter| polynomials.shape[parameter]);
         let mut majors = Tensor { shape: shape.collect(), channels, values: Vec::new() };
         let mut mixed = vec![0.0; channels];
-        let mut terms = Vec::new();
-        for number in 0..count {
-            let exponents = polynomials.exponents(number);
-            let values = polynomials.channels_of(number);
+        let mut minors: Vec<&[f64]> = Vec::new();
+        polynomials.products(|exponents, values| {
             if exponents.iter().zip(&is_major).all(|(power, is_major)| *is_major || *power == 0) {
                 majors.values.extend(values);
             } else if exponents.iter().sum::<usize>() <= 2 {
-                terms.push(values.to_vec());
+                minors.push(values);
             } else {
                 mixed.iter_mut().zip(values).for_each(|(sum, value)| *sum += value.abs());
             }
-        }
+        });
         (0..majors.shape.len()).for_each(|parameter| majors.bernstein_form(parameter));
-        let is_corner = |number: usize| {
-            majors.exponents(number).iter().zip(&majors.shape).all(|(power, size)| *power == 0 || power + 1 == *size)
+        let mut is_corner = Vec::with_capacity(majors.count());
+        majors.products(|exponents, _| {
+            let is_end = |(power, size): (&usize, &usize)| *power == 0 || power + 1 == *size;
+            is_corner.push(exponents.iter().zip(&majors.shape).all(is_end));
+        });
+        let column = |channel: usize| {
+            let nodes = majors.values.iter().skip(channel).step_by(channels).copied();
+            nodes.chain(minors.iter().map(|minor| minor[channel])).collect()
         };
+        let columns = (0..channels).map(column).collect();
         let mut table = Self {
-            is_corner: (0..majors.count()).map(is_corner).collect(),
-            center,
+            values: Columns { center, columns, nodes: is_corner.len() },
+            is_corner,
             deviation,
             monic: Vec::new(),
             monic_deviation: Vec::new(),
             linear,
-            terms,
             mixed,
-            nodes: majors.values,
         };
         table.divide(axis.orders[0] - 1);
         table
@@ -127,19 +133,20 @@ impl Table {
     /// With Bernstein's polynomials B, a/w = Σ B a_B / Σ B w_B is a mean of a_B/w_B with the weights B w_B. What other
     /// parameters add to a − r w with r = a₀/w₀ is at most divided by the least w.
     fn divide(&mut self, lead: usize) {
-        let (channels, w) = (self.center.len(), self.center[lead]);
-        self.monic = self.center.iter().map(|a| a / w).collect();
-        let others =
-            |channels: &[f64], channel: usize| (channels[channel] - self.monic[channel] * channels[lead]).abs();
-        let around: f64 = self.terms.iter().map(|term| term[lead].abs()).sum::<f64>() + self.mixed[lead];
-        let nodes = || self.nodes.chunks_exact(channels);
-        let least = nodes().map(|node| node[lead]).fold(f64::INFINITY, f64::min);
+        let Columns { center, columns, nodes: count } = &self.values;
+        let (channels, w) = (center.len(), center[lead]);
+        self.monic = center.iter().map(|a| a / w).collect();
+        let (nodes, minors) = columns[lead].split_at(*count);
+        let around: f64 = minors.iter().map(|own| own.abs()).sum::<f64>() + self.mixed[lead];
+        let least = nodes.iter().copied().fold(f64::INFINITY, f64::min);
         let deviation = |channel: usize| {
             if least.is_nan() || least <= around {
                 return f64::INFINITY;
             }
-            let by_nodes = nodes().map(|node| others(node, channel) / node[lead]).fold(0.0, f64::max);
-            let minors: f64 = self.terms.iter().map(|term| others(term, channel)).sum();
+            let others = |(own, lead): (&f64, &f64)| (own - self.monic[channel] * lead).abs();
+            let (own_nodes, own_minors) = columns[channel].split_at(*count);
+            let by_nodes = own_nodes.iter().zip(nodes).map(|both| others(both) / both.1).fold(0.0, f64::max);
+            let minors: f64 = own_minors.iter().zip(minors).map(others).sum();
             let mixed = self.mixed[channel] + self.monic[channel].abs() * self.mixed[lead];
             by_nodes * (least + around) / (least - around) + (minors + mixed) / (least - around)
         };
@@ -148,7 +155,7 @@ impl Table {
 
     /// Effort of a cell.
     pub fn effort(&self) -> usize {
-        self.is_corner.len() + self.terms.len() + 50
+        self.values.columns[0].len() + 50
     }
 }
 
@@ -173,37 +180,6 @@ pub(super) enum CellResult {
     TooLarge(usize),
     /// A machine of the box violates a limit.
     Violated,
-}
-
-/// A linear form of the channels, and the parts of it that are bounded.
-#[derive(Clone)]
-struct Form {
-    /// Coefficients at the middle of the interval, and their changes along it, linear and quadratic.
-    still: Vec<Complex<f64>>,
-    change: Vec<Complex<f64>>,
-    bend: Vec<Complex<f64>>,
-    /// Bound of what the interval adds beyond, and of all else.
-    curved: f64,
-    other: f64,
-}
-
-impl Form {
-    /// Largest value over the box in the middle of the interval, and what the interval adds at most.
-    fn most(&self, table: &Table) -> [f64; 2] {
-        let channels = table.center.len();
-        let of = |values: &[f64]| {
-            [modulus(dot(&self.still, values)), modulus(dot(&self.change, values)) + modulus(dot(&self.bend, values))]
-        };
-        let larger = |a: [f64; 2], b: [f64; 2]| [a[0].max(b[0]), a[1].max(b[1])];
-        let nodes = table.nodes.chunks_exact(channels).map(of).fold([0.0; 2], larger);
-        let sum = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
-        let minors = table.terms.iter().map(|term| of(term)).fold(nodes, sum);
-        sum(minors, [self.other, self.curved])
-    }
-}
-
-fn dot(form: &[Complex<f64>], channels: &[f64]) -> Complex<f64> {
-    form.iter().zip(channels).map(|(a, b)| a * b).sum()
 }
 
 impl Question<'_> {
@@ -235,8 +211,8 @@ impl Question<'_> {
         // |d| in the middle of the interval, and what the interval adds.
         let mut alone = none.clone();
         alone.jets[0] = Jet::ONE;
-        let bottom = self.form(table, &powers, &alone, [0.0; 2]).most(table);
-        let closed = self.form(table, &powers, &whole, bottom);
+        let bottom = self.form(table, &powers, &alone, [0.0; 2]).most(&table.values);
+        let closed = Seen::new(self.form(table, &powers, &whole, bottom), &table.values);
         let mut worst = CellResult::Holds;
         for &at in self.breaks {
             // The two parts of Δ at this break.
@@ -251,12 +227,12 @@ impl Question<'_> {
                 let is_outer = outer.is_none_or(|outer| outer == output);
                 both[usize::from(is_outer)] = both[usize::from(is_outer)].plus(part);
             }
-            let [inner, outer] = both.map(|factors| self.form(table, &powers, &factors, bottom));
-            for (numerator, limit) in [inner, outer].iter().zip(self.limits) {
+            for (factors, limit) in both.iter().zip(self.limits) {
                 if limit.is_infinite() {
                     continue;
                 }
-                match shown(table, &closed, numerator, limit) {
+                let numerator = Seen::new(self.form(table, &powers, factors, bottom), &table.values);
+                match shown(table, &closed, &numerator, limit) {
                     CellResult::Holds => {}
                     CellResult::Violated => return CellResult::Violated,
                     seen @ CellResult::TooLarge(_) => worst = seen,
@@ -324,13 +300,13 @@ impl Question<'_> {
 
     /// Σ factor · polynomial as a form of the channels.
     fn form(&self, table: &Table, powers: &[Jet], factors: &Factors, bottom: [f64; 2]) -> Form {
-        let channels = table.center.len();
+        let channels = table.values.center.len();
         let none = vec![Complex::ZERO; channels];
         let mut form = Form { still: none.clone(), change: none.clone(), bend: none, curved: 0.0, other: 0.0 };
         for (range, jet) in ranges(&self.axis.orders).into_iter().zip(&factors.jets) {
             for (channel, power) in range.zip(powers) {
                 let term = *jet * *power;
-                let most = table.center[channel].abs() + table.deviation[channel];
+                let most = table.values.center[channel].abs() + table.deviation[channel];
                 (form.still[channel], form.change[channel], form.bend[channel]) = (term.c[0], term.c[1], term.c[2]);
                 form.curved += most * term.radius;
                 form.other += (table.mixed[channel] + ROUNDING * self.axis.magnitudes[channel]) * term.most();
@@ -385,37 +361,28 @@ fn powers(sigma: f64, h: f64, count: usize) -> Vec<Jet> {
     (0..count).map(of).collect()
 }
 
-/// Δ and X of a node: in the middle of the interval, and what is linear and quadratic along it.
-type Node = [[Complex<f64>; 3]; 2];
-
 /// Checks |X| ≤ M |Δ|.
-fn shown(table: &Table, closed: &Form, numerator: &Form, limit: f64) -> CellResult {
-    let channels = table.center.len();
-    let [center, top] = [closed, numerator].map(|form| dot(&form.still, &table.center));
-    if modulus(top) > limit * BEYOND * modulus(center) + closed.other * limit + numerator.other {
+fn shown(table: &Table, closed: &Seen, numerator: &Seen, limit: f64) -> CellResult {
+    let violates = |delta: Complex<f64>, x: Complex<f64>| {
+        modulus(x) > limit * BEYOND * modulus(delta) + closed.form.other * limit + numerator.form.other
+    };
+    if violates(closed.center, numerator.center) {
         return CellResult::Violated;
     }
-    // Δ and X of each node, and their change along the interval.
-    let at = |channels: &[f64]| {
-        [closed, numerator].map(|form| [&form.still, &form.change, &form.bend].map(|form| dot(form, channels)))
-    };
-    let nodes: Vec<Node> = table.nodes.chunks_exact(channels).map(at).collect();
-    let minors: Vec<Node> = table.terms.iter().map(|term| at(term)).collect();
-    let corners = nodes.iter().zip(&table.is_corner).filter(|(_, is_corner)| **is_corner);
-    for (node, _) in corners {
-        if modulus(node[1][0]) > limit * BEYOND * modulus(node[0][0]) + closed.other * limit + numerator.other {
-            return CellResult::Violated;
-        }
+    let mut corners = (0..table.is_corner.len()).filter(|&node| table.is_corner[node]);
+    if corners.any(|node| violates(closed.values.still.at(node), numerator.values.still.at(node))) {
+        return CellResult::Violated;
     }
-    let check = |is_still: bool| is_shown(&nodes, &minors, [center, top], [closed, numerator], limit, is_still);
-    if check(false) {
+    let check = |along: f64| is_shown(table.values.nodes, [closed, numerator], limit, along);
+    if check(1.0) {
         return CellResult::Holds;
     }
-    if check(true) {
+    if check(0.0) {
         return CellResult::TooWide;
     }
-    let weight =
-        |linear: &Vec<f64>| limit * modulus(dot(&closed.still, linear)) + modulus(dot(&numerator.still, linear));
+    let weight = |linear: &Vec<f64>| {
+        limit * modulus(dot(&closed.form.still, linear)) + modulus(dot(&numerator.form.still, linear))
+    };
     let weights: Vec<f64> = table.linear.iter().map(weight).collect();
     let most = (0..weights.len()).max_by(|&a, &b| weights[a].total_cmp(&weights[b]));
     match most {
@@ -425,33 +392,12 @@ fn shown(table: &Table, closed: &Form, numerator: &Form, limit: f64) -> CellResu
     }
 }
 
-/// Whether |X| ≤ M |Δ| follows; with `is_still`, in the middle of the interval alone.
-fn is_shown(
-    nodes: &[Node],
-    minors: &[Node],
-    [center, top]: [Complex<f64>; 2],
-    [closed, numerator]: [&Form; 2],
-    limit: f64,
-    is_still: bool,
-) -> bool {
-    let along = if is_still { 0.0 } else { 1.0 };
-    let radii = [closed, numerator].map(|form| form.other + along * form.curved);
-    let away = |values: &Node, from: [Complex<f64>; 2]| {
-        [0, 1].map(|k| {
-            let [still, change, bend] = values[k];
-            modulus(still - from[k]) + along * (modulus(change) + modulus(bend))
-        })
-    };
-    let mut off = radii;
-    for minor in minors {
-        let own = away(minor, [Complex::ZERO; 2]);
-        off = [off[0] + own[0], off[1] + own[1]];
-    }
-    let hull = nodes
-        .iter()
-        .map(|node| away(node, [center, top]))
-        .fold([0.0_f64; 2], |most, own| [most[0].max(own[0]), most[1].max(own[1])]);
-    off = [off[0] + hull[0], off[1] + hull[1]];
+/// Whether |X| ≤ M |Δ| follows; in the middle of the interval alone if `along` is zero, otherwise one.
+fn is_shown(nodes: usize, both: [&Seen; 2], limit: f64, along: f64) -> bool {
+    let [closed, numerator] = both;
+    let (center, top) = (closed.center, numerator.center);
+    let radii = both.map(|seen| seen.radius(along));
+    let off = both.map(|seen| seen.off(along));
     if off.iter().any(|off| !off.is_finite()) {
         return false;
     }
@@ -471,24 +417,27 @@ fn is_shown(
     };
     // |X| is at most its part along the nearest direction over the cosine of the angle between them.
     let longer = 1.0 / (0.5 * apart).cos();
+    let [mut values, mut changes, mut bends] = [(); 3].map(|()| vec![0.0; closed.values.still.count()]);
+    let [still, change, bend]: [fn(&Values) -> &Numbers; 3] =
+        [|values| &values.still, |values| &values.change, |values| &values.bend];
+    let [still, change, bend] = [still, change, bend].map(|of| both.map(|seen| of(&seen.values)));
     directions.into_iter().all(|phi| {
         let turn = Complex::new(0.0, -phi).exp() * longer;
         let mut theta = center.arg();
         for _ in 0..3 {
             let lead = Complex::new(0.0, -theta).exp() * limit;
-            let part = |delta: Complex<f64>, x: Complex<f64>| (lead * delta - turn * x).re;
-            let of = |values: &Node| {
-                let [still, change, bend] = [0, 1, 2].map(|k| part(values[0][k], values[1][k]));
-                (still, along * (change.abs() + bend.abs()))
-            };
+            parts(&mut values, still, [lead, turn]);
+            parts(&mut changes, change, [lead, turn]);
+            parts(&mut bends, bend, [lead, turn]);
+            changes.iter_mut().zip(&bends).for_each(|(change, bend)| *change = along * (change.abs() + bend.abs()));
             let mut least = (f64::INFINITY, center);
-            for node in nodes {
-                let (value, change) = of(node);
+            for (node, (value, change)) in values.iter().zip(&changes).enumerate().take(nodes) {
                 if value - change < least.0 {
-                    least = (value - change, node[0][0]);
+                    least = (value - change, closed.values.still.at(node));
                 }
             }
-            let others: f64 = minors.iter().map(of).map(|(value, change)| value.abs() + change).sum();
+            let minors = values.iter().zip(&changes).skip(nodes);
+            let others: f64 = minors.map(|(value, change)| value.abs() + change).sum();
             if least.0 - others - limit * radii[0] - longer * radii[1] >= 0.0 {
                 return true;
             }

@@ -46,6 +46,17 @@ fn bernstein(degree: usize) -> DMatrix<f64> {
     share * substituted(degree, -1.0, 2.0)
 }
 
+/// The exponents of the next product of powers, in the order of a tensor of this shape.
+pub(super) fn next(exponents: &mut [usize], shape: &[usize]) {
+    for (exponent, size) in exponents.iter_mut().zip(shape).rev() {
+        *exponent += 1;
+        if *exponent < *size {
+            return;
+        }
+        *exponent = 0;
+    }
+}
+
 impl Tensor {
     /// Number of products of powers.
     pub fn count(&self) -> usize {
@@ -86,13 +97,13 @@ impl Tensor {
         self.along(parameter, &bernstein(self.shape[parameter] - 1));
     }
 
-    /// Exponents of a product of powers by its number.
-    pub fn exponents(&self, mut number: usize) -> Vec<usize> {
-        let mut all = vec![0; self.shape.len()];
-        for (exponent, size) in all.iter_mut().zip(&self.shape).rev() {
-            (*exponent, number) = (number % size, number / size);
+    /// Passes the exponents and the channels of every product of powers, in their order.
+    pub fn products<'s>(&'s self, mut take: impl FnMut(&[usize], &'s [f64])) {
+        let mut exponents = vec![0; self.shape.len()];
+        for channels in self.values.chunks_exact(self.channels) {
+            take(&exponents, channels);
+            next(&mut exponents, &self.shape);
         }
-        all
     }
 
     /// Channels of a product of powers.
@@ -103,11 +114,10 @@ impl Tensor {
     /// The polynomials at a point.
     pub fn at(&self, point: &[f64]) -> Vec<f64> {
         let mut sums = vec![0.0; self.channels];
-        for number in 0..self.count() {
-            let exponents = self.exponents(number);
+        self.products(|exponents, channels| {
             let factor: f64 = exponents.iter().zip(point).map(|(power, t)| t.powi(*power as i32)).product();
-            sums.iter_mut().zip(self.channels_of(number)).for_each(|(sum, value)| *sum += factor * value);
-        }
+            sums.iter_mut().zip(channels).for_each(|(sum, value)| *sum += factor * value);
+        });
         sums
     }
 }
@@ -134,6 +144,15 @@ mod tests {
             let found = pair().at(&[s, t]);
             assert!((found[0] - f(s, t)).abs() < 1e-14 && (found[1] + 0.5 * f(s, t)).abs() < 1e-14, "{found:?}");
         }
+    }
+
+    #[test]
+    fn products_have_their_exponents_in_order() {
+        let (pair, mut all) = (pair(), Vec::new());
+        pair.products(|exponents, channels| all.push((exponents.to_vec(), channels[0])));
+        let [one, two] = [[1.0, 2.0, 3.0], [4.0, -1.0, -2.0]];
+        let of = |s: usize, terms: [f64; 3]| (0..3).map(move |t| (vec![s, t], terms[t]));
+        assert_eq!(all, of(0, one).chain(of(1, two)).collect::<Vec<_>>());
     }
 
     #[test]

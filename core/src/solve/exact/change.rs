@@ -38,7 +38,11 @@ impl<const N: usize> Between for Core<N> {
 
     fn known(&self, index: usize) -> Known {
         let guard = &self.matrices.guards[index];
-        Known { value: guard.value(&self.z), noise: guard.noise(&self.z) }
+        Known { value: guard.value(&self.z), noise: self.noise_of(index) }
+    }
+
+    fn noise_of(&self, index: usize) -> f64 {
+        self.matrices.guards[index].noise(&self.z)
     }
 
     fn known_at_begin(&self, index: usize) -> Known {

@@ -159,9 +159,11 @@ impl<'a, const N: usize> ExactRun<'a, N> {
         let most = if observed { ROWS } else { usize::MAX };
         let (mut left, h) = (intervals, self.grid.interval());
         while left > 0 {
-            let scratch = &mut [[0.0; N]; ROWS];
+            // The hold of a controller is often a single interval.
+            let (mut one, mut several) = ([[0.0; N]], None);
             let room = match self.recorder.detail {
-                Detail::None => &mut scratch[..],
+                Detail::None if left == 1 => &mut one[..],
+                Detail::None => &mut several.insert([[0.0; N]; ROWS])[..],
                 _ => self.recorder.room(),
             };
             let rows = left.min(room.len().min(most) as u64) as usize;

@@ -44,14 +44,17 @@ impl Between for Core {
 
     fn known(&self, index: usize) -> Known {
         let value = self.field().guards(&self.stretch.input(self.tau), &self.y)[index];
-        let noise = match self.transition(index).cause {
+        Known { value, noise: self.noise_of(index) }
+    }
+
+    fn noise_of(&self, index: usize) -> f64 {
+        match self.transition(index).cause {
             Cause::BreakForward(body) => self.load(body, true).noise,
             Cause::BreakBackward(body) => self.load(body, false).noise,
             Cause::Stop(_) | Cause::GearTorque(_) | Cause::Switch(_) | Cause::Leave(_) => {
                 self.error_at(index) * (ERRORS / BEGUN)
             }
-        };
-        Known { value, noise }
+        }
     }
 
     fn known_at_begin(&self, index: usize) -> Known {
