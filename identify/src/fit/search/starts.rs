@@ -564,9 +564,9 @@ mod tests {
         for (output, times) in [(0, 1.0), (1, 3.0)] {
             let seen = &problem.runs[0].seen[output];
             let deviation = noise.deviation(seen.quantity);
-            for k in 0..n {
+            for (k, weight) in seen.weights.iter().enumerate() {
                 let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-                at.residuals[first + output * n + k] = sign * times * deviation * seen.weights[k];
+                at.residuals[first + output * n + k] = sign * times * deviation * weight;
             }
         }
         assert!((times_noise(&problem, &at) - 3.0).abs() < 1e-9, "{}", times_noise(&problem, &at));
