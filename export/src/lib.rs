@@ -364,4 +364,32 @@ mod tests {
         let products = fact(&exported, "products and quotients in a step at most");
         assert!(products > 4 * fact(&exported, "states") * fact(&exported, "order of a Taylor series"), "{products}");
     }
+
+    #[test]
+    fn the_longest_step_is_the_longest_one_that_is_exported() {
+        let case = Case::from_text("axis.toml", TEMPLATE).unwrap();
+        let longest = c::longest_step(&Tables::new(&mechanism(&case)).unwrap());
+        let with = |step: f64| {
+            let options = Options { part: Some(Part::Plant), step: Some(step), ..Options::default() };
+            export(&case, Target::C, "axis", &options)
+        };
+        assert!(with(0.999 * longest).is_ok(), "{longest} s");
+        assert!(with(1.001 * longest).is_err(), "{longest} s");
+    }
+
+    #[test]
+    fn an_fmu_describes_its_columns_and_has_the_lead_of_its_feed_forward() {
+        let file = format!("{}/../stages/sollmann-jouaneh/controllers/pid-rigid.toml", env!("CARGO_MANIFEST_DIR"));
+        let model = |lead: &str| {
+            let change = format!("controller.feed_forward={{ model = \"rigid\"{lead} }}");
+            fmu::Model::new(&Case::read_with(&file, &[&change]).unwrap(), true).unwrap()
+        };
+        let variables = model("").variables;
+        let about: Vec<&str> = variables.iter().map(|variable| &*variable.description).collect();
+        assert!(about.iter().any(|about| about.starts_with("Way of the cart")), "{about:?}");
+        assert!(about.iter().all(|about| !about.contains(", times 1.")), "{about:?}");
+        // The delay and half a sample, unless it is given.
+        assert!(model("").lead().is_some_and(|lead| (lead - 1e-3).abs() < 1e-12));
+        assert_eq!(model(", lead = \"0 s\"").lead(), None);
+    }
 }

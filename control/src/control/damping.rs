@@ -165,4 +165,27 @@ mod tests {
             assert!(left(f0, zeta) > 1e-3, "{f0} {zeta}: {}", left(f0, zeta));
         }
     }
+
+    /// No other amplitude and floor leave less.
+    #[test]
+    fn amplitude_and_floor_have_the_least_squares() {
+        let bins: Vec<(f64, f64)> = (30..60)
+            .map(|f| (f64::from(f), 2.0 + (0.9 * f64::from(f)).sin() + 40.0 / f64::from(1 + (f - 44) * (f - 44))))
+            .collect();
+        let (f0, zeta) = (44.0_f64, 0.03_f64);
+        let own = squares(&bins, &[(0.0, 1.0)], 1.0, f0, zeta);
+        let g = |f: f64| {
+            f * (f0 * f0 + (2.0 * zeta * f).powi(2)) / ((f0 * f0 - f * f).powi(2) + (2.0 * zeta * f0 * f).powi(2))
+        };
+        let left = |a: f64, c: f64| -> f64 { bins.iter().map(|(f, p)| ((p - a * g(*f) - c) / p).powi(2)).sum() };
+        // A search by halving its range, which needs no normal equations.
+        let (mut best, mut range) = ([10.0, 2.0], [10.0, 2.0]);
+        for _ in 0..60 {
+            let near = (0..25).map(|k| [0, 1].map(|j| best[j] + 0.5 * range[j] * f64::from([k % 5, k / 5][j] - 2)));
+            let least = near.min_by(|a, b| left(a[0], a[1]).total_cmp(&left(b[0], b[1]))).unwrap();
+            (best, range) = (least, range.map(|range| 0.7 * range));
+        }
+        let least = left(best[0], best[1]);
+        assert!(best[0] > 0.0 && best[1] > 0.0 && (own / least - 1.0).abs() < 1e-9, "{best:?}: {own} {least}");
+    }
 }

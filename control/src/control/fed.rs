@@ -45,3 +45,28 @@ impl Controller for Fed<'_> {
         self.last = 0.0;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+
+    /// The signal is added to the command, and what the controller takes for its own limited command is without it.
+    #[test]
+    fn a_signal_adds_to_the_command_at_its_time() {
+        let file = format!("{}/../stages/sollmann-jouaneh/controllers/pid.toml", env!("CARGO_MANIFEST_DIR"));
+        let case = Case::read_with(&file, &[]).unwrap();
+        let controller = Standard::new(case.controller.as_ref().unwrap(), &case.machine).unwrap();
+        let signal = Added::new(1e-3, vec![0.0, 0.7, -0.4]);
+        let (mut plain, mut fed) = (controller.clone(), Fed::new(controller, &signal));
+        for (k, added) in [0.0, 0.7, -0.4, -0.4].into_iter().enumerate() {
+            let seen = Observation { time: 1e-3 * k as f64, position: -1e-4 * k as f64, ..Observation::default() };
+            let own = plain.step(&seen);
+            let whole = fed.step(&seen);
+            assert!((whole - own - added).abs() < 1e-12, "{k}: {whole} {own}");
+            // Half of both is cut off.
+            plain.limited(0.5 * own);
+            fed.limited(0.5 * own + added);
+        }
+    }
+}

@@ -157,3 +157,31 @@ impl Law for CascadeLaw {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calculator::Evaluation;
+
+    /// Of what a limit takes from the command, the integrals lose T/T_t in a sample, and never more than all.
+    #[test]
+    fn integrals_follow_a_limit_with_their_tracking_time() {
+        let every = 1e-3;
+        for (tracking, share) in [(2e-2, 0.05), (1e-3, 1.0), (1e-4, 1.0)] {
+            let mut slots = Slots::default();
+            let cascade = Cascade { speed_integral: 3.0, tracking, ..Cascade::new(10.0, 2.0) };
+            let law = CascadeLaw::new(&mut slots, &cascade, every);
+            let mut memory = vec![0.0; slots.count()];
+            law.limited(&mut Evaluation::on(&mut memory), -4.0, 0.0);
+            let sum = Evaluation::on(&mut memory).memory(law.speed_integral);
+            assert!((sum + 4.0 * share).abs() < 1e-12, "{tracking}: {sum}");
+
+            let mut slots = Slots::default();
+            let law = PidLaw::new(&mut slots, &Pid { integral: 3.0, tracking, ..Pid::new(10.0) }, every);
+            let mut memory = vec![0.0; slots.count()];
+            law.limited(&mut Evaluation::on(&mut memory), -4.0, 0.0);
+            let sum = Evaluation::on(&mut memory).memory(law.integral);
+            assert!((sum + 4.0 * share).abs() < 1e-12, "{tracking}: {sum}");
+        }
+    }
+}

@@ -87,3 +87,34 @@ pub fn required(gains: &SlidingMode, rigid: &Rigid, spread: f64, speed: f64, acc
         + most(rigid.coulomb);
     spread * known / rigid.mass
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+    use crate::design::Structure;
+
+    /// σ σ̇ < 0 at the layer's edge for each mass and friction within the spread.
+    #[test]
+    fn the_reaching_gain_exceeds_what_the_model_is_off_by() {
+        let file = format!("{}/../stages/sollmann-jouaneh/controllers/sliding.toml", env!("CARGO_MANIFEST_DIR"));
+        let case = Case::read_with(&file, &[]).unwrap();
+        let Structure::SlidingMode(gains) = case.controller.unwrap().structure else { panic!("no sliding mode") };
+        let rigid = Rigid::new(&case.machine);
+        let (spread, speed, acceleration) = (0.2, 0.3, 4.0);
+        let gain = required(&gains, &rigid, spread, speed, acceleration);
+        let ends = [1.0 - spread, 1.0 + spread];
+        let mut worst = 0.0_f64;
+        for mass in ends {
+            for viscous in ends {
+                for coulomb in ends {
+                    let inertial = (mass - 1.0) * rigid.mass * (acceleration + gains.bandwidth * gains.boundary);
+                    let viscous = (viscous - 1.0) * rigid.viscous[0].max(rigid.viscous[1]) * speed;
+                    let coulomb = (coulomb - 1.0) * rigid.coulomb[0].max(rigid.coulomb[1]);
+                    worst = worst.max((inertial + viscous + coulomb).abs() / rigid.mass);
+                }
+            }
+        }
+        assert!((gain / worst - 1.0).abs() < 1e-12, "{gain} {worst}");
+    }
+}

@@ -81,3 +81,22 @@ pub fn worst(
 fn largest(figures: &Figures, of: fn(&Deviation) -> f64) -> f64 {
     figures.loads.iter().map(|load| of(&load.error).abs()).fold(0.0, f64::max)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::{Case, TEMPLATE};
+
+    #[test]
+    fn each_axis_of_a_spread_differs_in_what_it_is_called_after() {
+        let machine = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
+        let all = spread(&machine, 0.1);
+        assert_eq!(all.len(), 2 * kinds(&machine).len());
+        assert!(all.iter().all(|(name, other)| *other != machine && !name.is_empty()));
+        for (factor, word) in [(1.1, "more"), (0.9, "less")] {
+            let heavier = all.iter().find(|(name, _)| *name == format!("mass 10 % {word}"));
+            let mass = heavier.unwrap_or_else(|| panic!("{all:?}")).1.cart.mass;
+            assert!((mass / machine.cart.mass - factor).abs() < 1e-12, "{mass}");
+        }
+    }
+}

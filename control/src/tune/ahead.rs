@@ -73,3 +73,26 @@ impl Work<'_> {
         Ok(best.filter(|best| worst(best) <= PAYS * worst(after)).map(|verdict| Ahead { verdict }))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+
+    /// A PID may get a model, state feedback has one.
+    #[test]
+    fn only_what_is_not_there_is_tried() {
+        let read = |name: &str, changes: &[&str]| {
+            let file = format!("{}/../stages/sollmann-jouaneh/controllers/{name}.toml", env!("CARGO_MANIFEST_DIR"));
+            let case = Case::read_with(&file, changes).unwrap();
+            let forms = forms(&case.machine, case.controller.as_ref().unwrap());
+            forms.iter().map(|form| (form.model, form.compensate_stretch)).collect::<Vec<_>>()
+        };
+        use FeedForwardModel::{Elastic, Rigid};
+        let all = [(Rigid, false), (Rigid, true), (Elastic, false), (Elastic, true)];
+        assert_eq!(read("pid", &[]), all);
+        assert_eq!(read("pid", &["belt.model=\"rigid\""]), [(Rigid, false)]);
+        assert_eq!(read("lqg", &[]), []);
+        assert_eq!(read("sliding", &[]), []);
+    }
+}

@@ -357,6 +357,7 @@ fn all<const N: usize>(plant: &Plant, sampled: &Sampled<N>, feedback: &Feedback)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nalgebra::DMatrix;
 
     fn check<const N: usize>() {
         let entry = |i: usize, j: usize| Complex::new(1.0 / (1 + i + j) as f64, (i * j) as f64 - 0.5);
@@ -372,5 +373,23 @@ mod tests {
         check::<1>();
         check::<2>();
         check::<3>();
+    }
+
+    fn check_singular_values<const N: usize>() {
+        for seed in 0..20 {
+            let entry = |i: usize, j: usize, part: usize| ((7 * seed + 5 * i + 3 * j + part) as f64).sin();
+            let a = Square::<N>::from_fn(|i, j| Complex::new(entry(i, j, 0), entry(i, j, 1)));
+            let known = DMatrix::from_fn(N, N, |i, j| a[(i, j)]).singular_values();
+            let (most, least) = (known.max(), known.min());
+            assert!((largest(&a) - most).abs() < 1e-12 * most, "{N} {seed}: {} {most}", largest(&a));
+            assert!((smallest(&a) - least).abs() < 1e-9 * most, "{N} {seed}: {} {least}", smallest(&a));
+        }
+    }
+
+    #[test]
+    fn singular_values_are_those_of_the_decomposition() {
+        check_singular_values::<1>();
+        check_singular_values::<2>();
+        check_singular_values::<3>();
     }
 }

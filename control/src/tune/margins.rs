@@ -518,17 +518,38 @@ mod tests {
     /// The peak of a grid is lower than that beside it.
     #[test]
     fn no_frequency_beside_a_peak_has_a_larger_value() {
-        let (plant, feedback) = read("0.5 ms");
-        by_drives!(&plant, |sampled| {
-            let mut curve = Curve::on_grid(&plant, sampled, &feedback);
-            curve.divide();
-            for of in [Open::sensitivity, Open::complementary] {
-                let top = curve.highest(of);
-                for beside in [1.0 - 1e-3, 1.0 - 1e-5, 1.0 + 1e-5, 1.0 + 1e-3] {
-                    let value = of(&curve.at(beside * top.omega), top.at);
-                    assert!(value <= top.value * (1.0 + 1e-12), "{value} at {beside} of {}: {}", top.omega, top.value);
+        for delay in ["0.1 ms", "0.5 ms", "1.3 ms", "2 ms", "2.7 ms", "3.1 ms"] {
+            let (plant, feedback) = read(delay);
+            by_drives!(&plant, |sampled| {
+                let mut curve = Curve::on_grid(&plant, sampled, &feedback);
+                curve.divide();
+                for of in [Open::sensitivity, Open::complementary] {
+                    let top = curve.highest(of);
+                    let beside = (1..400).map(|k| 1e-5 * f64::from(k)).flat_map(|off| [1.0 - off, 1.0 + off]);
+                    for omega in beside.map(|factor| factor * top.omega) {
+                        let value = of(&curve.at(omega), top.at);
+                        assert!(value <= top.value * (1.0 + 1e-12), "{delay}: {value} at {omega}, {}", top.value);
+                    }
                 }
-            }
-        });
+            });
+        }
+    }
+
+    #[test]
+    fn a_rough_look_has_the_figures_of_an_exact_one_within_some_per_cent() {
+        for delay in ["0.1 ms", "0.5 ms", "2 ms"] {
+            let (plant, feedback) = read(delay);
+            let (rough, exact) = (Rough::new(&plant, &feedback), Margins::new(&plant, &feedback));
+            let pairs = [
+                (rough.peaks.peaks[0], exact.sensitivity),
+                (rough.peaks.peaks[1], exact.complementary),
+                (rough.disturbance, exact.disturbance),
+                (rough.following, exact.following),
+            ];
+            assert!(pairs.iter().all(|(rough, exact)| (rough / exact - 1.0).abs() < 0.05), "{delay}: {pairs:?}");
+        }
+        let (plant, feedback) = read("20 ms");
+        let rough = Rough::new(&plant, &feedback);
+        assert_eq!((rough.peaks.peaks, rough.disturbance), ([f64::INFINITY; 2], f64::INFINITY));
     }
 }

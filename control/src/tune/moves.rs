@@ -156,4 +156,22 @@ mod tests {
             assert!((used - FORCE).abs() < 1e-9, "{amperes} A: {used} of {left} N");
         }
     }
+
+    /// A pulley's encoder of c counts per turn has a count of 2πr/c, one at the cart its own length.
+    #[test]
+    fn the_window_of_a_move_is_five_counts_of_a_coarse_encoder() {
+        let folder = format!("{}/../stages/sollmann-jouaneh/controllers", env!("CARGO_MANIFEST_DIR"));
+        let window = |changes: &[&str]| {
+            let case = Case::read_with(format!("{folder}/pid.toml"), changes).unwrap();
+            let moves = standard(&case.machine, case.controller.as_ref().unwrap()).unwrap();
+            assert!(moves.iter().all(|one| one.window == moves[0].window));
+            (moves[0].window, case.machine.pulley_radius)
+        };
+        let (found, _) = window(&["encoder={ at = \"cart\", counts = 10000 }"]);
+        assert!((found / 5e-4 - 1.0).abs() < 1e-9, "{found}");
+        let (found, radius) = window(&["encoder={ at = \"drive_pulley\", counts = 100 }"]);
+        assert!((found / (5.0 * 2.0 * std::f64::consts::PI * radius / 100.0) - 1.0).abs() < 1e-9, "{found}");
+        let (found, _) = window(&["encoder={ at = \"cart\", counts = 1000000 }"]);
+        assert_eq!(found, WINDOW);
+    }
 }

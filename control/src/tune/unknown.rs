@@ -115,3 +115,31 @@ pub(super) fn with_the_rest(mut fitted: Vec<Unknown>, machine: &Machine) -> Vec<
     fitted.extend(rest);
     fitted
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::{Case, TEMPLATE};
+
+    /// K_t and K_e of a motor are one number: the one that was not fitted has the deviation of the other, and all else
+    /// its default spread.
+    #[test]
+    fn what_was_not_fitted_has_its_default_spread_or_that_of_its_kin() {
+        let machine = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
+        let free = Free::new(&machine, "motor.torque_constant", &[], &[]).unwrap();
+        let ends = [0.9, 1.3].map(|part| part * free.start);
+        let fitted = vec![Unknown::fitted(free, ends)];
+        let all = with_the_rest(fitted, &machine);
+        assert!(all[0].name == "motor.torque_constant" && all.len() > 3);
+        let mut count = 0;
+        for unknown in &all[1..] {
+            let parts = [unknown.low, unknown.high].map(|value| value / unknown.free.start);
+            let is_kin = unknown.name.contains("motor.back_emf_constant");
+            count += usize::from(is_kin);
+            let known = if is_kin { [0.9, 1.3] } else { [1.0 - SPREAD, 1.0 + SPREAD] };
+            assert!(parts.iter().zip(known).all(|(part, known)| (part - known).abs() < 1e-12), "{unknown:?}");
+            assert_eq!(unknown.is_fitted, is_kin, "{}", unknown.name);
+        }
+        assert_eq!(count, 1);
+    }
+}

@@ -163,8 +163,8 @@ impl Mechanism {
 mod tests {
     use super::*;
     use crate::friction::Friction;
-    use crate::mechanism::testing::{body, spring};
-    use crate::mechanism::{Body, Spring};
+    use crate::mechanism::testing::{PART, body, spring};
+    use crate::mechanism::{Amplifier, AmplifierMode, Body, Drive, Motor, Spring};
 
     /// A mass of 2 kg with friction and one of 3 kg without, between which is a damped spring.
     fn pair() -> Mechanism {
@@ -198,5 +198,23 @@ mod tests {
             assert!((power.spring[0] - 5.0 * (speed + 0.2).powi(2)).abs() < 1e-12, "{power:?}");
             assert!(power.imbalance().abs() < 1e-12, "{power:?}");
         }
+    }
+
+    /// K_e ≠ K_t: the motor's voltage takes more power than its torque gives.
+    #[test]
+    fn a_motor_of_two_constants_converts_power() {
+        let motor = Motor { back_emf_constant: 0.07, gear_ratio: 3.0, ..Motor::brushed(0.05, 2.0) };
+        let amplifier = Amplifier::ideal(AmplifierMode::Voltage, 4.0);
+        let drive = Drive { label: PART, voltage: PART, current: PART, pulley: 0, shaft: 0, motor, amplifier };
+        let mechanism = Mechanism::new(vec![body(0, 0.1)], Vec::new(), vec![drive]);
+        let (state, mut input) = (state([0.0; 2], [8.0, 0.0]), [0.0; DRIVES]);
+        input[0] = 1.5;
+        let power = mechanism.power(mechanism.first_mode(&state), &state, &input);
+        // i = (g u − K_e n φ̇)/R, and (K_e − K_t) n i φ̇
+        let current = (4.0 * 1.5 - 0.07 * 3.0 * 8.0) / 2.0;
+        assert!((power.conversion - 0.02 * 3.0 * current * 8.0).abs() < 1e-12, "{power:?}");
+        assert!((power.copper - 2.0 * current * current).abs() < 1e-12, "{power:?}");
+        assert!(power.imbalance().abs() < 1e-12, "{power:?}");
+        assert!(power.scale() >= power.input.abs() && power.input > 0.0, "{power:?}");
     }
 }

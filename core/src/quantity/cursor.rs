@@ -78,3 +78,14 @@ impl<'a> Cursor<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_text_of_200_bytes_is_read_and_a_longer_one_is_not() {
+        assert_eq!(Cursor::new(&format!("{:>200}", "3 mm")).unwrap().chars, ['3', ' ', 'm', 'm']);
+        assert!(Cursor::new(&format!("{:>201}", "3 mm")).is_err());
+    }
+}

@@ -126,3 +126,36 @@ fn first_beyond(powers: &[f64; DEGREE + 1], level: f64, side: f64, within: std::
     }
     first_fall(&left).map(|share| within.start + share * length)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A command that rises and falls: at any time the nearest microstep, without a negative zero.
+    #[test]
+    fn a_driver_of_microsteps_applies_the_nearest_one() {
+        let step = 0.05;
+        let mut pieces = Pieces::held(&[-0.013], 2.0, 3.0);
+        pieces.coefficients[0][1] = 1.1;
+        pieces.coefficients[0][2] = -1.3;
+        let command = |time: f64| -0.013 + 1.1 * (time - 2.0) - 1.3 * (time - 2.0) * (time - 2.0);
+        let (mut rest, mut count) = (pieces, 0);
+        while rest.start < 3.0 {
+            let applied = rest.stepped(0, step, 3.0);
+            let value = applied.coefficients[0][0];
+            assert!(
+                applied.coefficients[0][1..].iter().all(|c| *c == 0.0) && (value != 0.0 || value.is_sign_positive())
+            );
+            assert!(applied.end > rest.start, "{applied:?}");
+            let end = applied.end.min(3.0);
+            for k in 1..50 {
+                let time = rest.start + (end - rest.start) * f64::from(k) / 50.0;
+                assert!((value - command(time)).abs() <= 0.5 * step + 1e-8, "{time}: {value} {}", command(time));
+            }
+            count += 1;
+            rest = Pieces { end: 3.0, ..pieces.since(end) };
+        }
+        // Up from 0 to 0.2, down to −0.2.
+        assert_eq!(count, 13);
+    }
+}

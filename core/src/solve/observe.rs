@@ -530,3 +530,50 @@ impl<'a> Output<'a> {
         Output { detail: self.detail, sink: self.sink, observer }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Time of the largest of these values, which are `interval` apart from 1 s on.
+    fn largest(values: &[f64], bow: f64, share: f64) -> (f64, f64) {
+        let reading = |value: &f64| {
+            let mut reading = [0.0; QUANTITIES];
+            reading[5] = *value;
+            reading
+        };
+        let readings: Vec<Reading> = values.iter().map(reading).collect();
+        let (bow, mode) = ([bow; QUANTITIES], Mode::new(std::iter::empty()));
+        let stretch = Stretch::new((1.0, 0.5), &readings, &bow, &mode, false);
+        assert_eq!(stretch.end(), 1.0 + 0.5 * (values.len() - 1) as f64);
+        stretch.largest(5, share)
+    }
+
+    #[test]
+    fn of_equal_values_the_last_is_the_largest_and_at_a_limit_the_first() {
+        assert_eq!(largest(&[1.0, -3.0, 2.0, 3.0, 0.5], 0.1, 0.0), (3.0, 2.5));
+        assert_eq!(largest(&[1.0, -3.0, 2.0, 2.99, 0.5], 0.1, 1e-2), (-3.0, 2.5));
+        assert_eq!(largest(&[1.0, 3.0, 3.0, 3.0], 0.1, 0.0), (3.0, 2.5));
+        // Held by a limit.
+        assert_eq!(largest(&[1.0, 3.0, 3.0, 3.0], 0.0, 0.0), (3.0, 1.5));
+        assert_eq!(largest(&[2.0, 2.0, 2.0], 0.0, 0.0), (2.0, 1.0));
+    }
+
+    /// f = from + (to − from) s ± 4 bow s (1 − s)
+    #[test]
+    fn values_between_two_readings_lie_within_their_range() {
+        let mode = Mode::new(std::iter::empty());
+        for (from, to, bow) in [(1.0, 2.0, 0.1), (1.0, 2.0, 0.3), (-2.0, 1.0, 5.0), (0.7, 0.7, 0.0), (0.7, 0.7, 0.2)] {
+            let [from_all, to_all, bow_all] = [from, to, bow].map(|value: f64| [value; QUANTITIES]);
+            let gap =
+                Gap { begin: 0.0, length: 1.0, from: &from_all, to: &to_all, bow: &bow_all, mode: &mode, few: false };
+            let (low, high) = gap.range(2);
+            let values = (0..=1000)
+                .map(|k| f64::from(k) / 1000.0)
+                .flat_map(|s| [-1.0, 1.0].map(|sign| from + (to - from) * s + sign * 4.0 * bow * s * (1.0 - s)));
+            let (least, most) = values.fold((f64::MAX, f64::MIN), |(l, m), v| (l.min(v), m.max(v)));
+            assert!((low - least).abs() < 1e-5 && (high - most).abs() < 1e-5, "{low} {least} {high} {most}");
+            assert_eq!(gap.holds(2), from == to && bow == 0.0);
+        }
+    }
+}

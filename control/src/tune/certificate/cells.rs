@@ -447,3 +447,44 @@ fn is_shown(nodes: usize, both: [&Seen; 2], limit: f64, along: f64) -> bool {
         false
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// |X| against M |Δ| of a single machine.
+    fn judged(x: f64, change: f64, limit: f64) -> CellResult {
+        let form = |still: f64, change: f64| Form {
+            still: vec![Complex::new(0.0, still)],
+            change: vec![Complex::new(0.0, change)],
+            bend: vec![Complex::ZERO],
+            curved: 0.0,
+            other: 0.0,
+        };
+        let table = Table {
+            center: vec![1.0],
+            deviation: vec![0.0],
+            monic: vec![1.0],
+            monic_deviation: vec![0.0],
+            linear: Vec::new(),
+            terms: Vec::new(),
+            mixed: vec![0.0],
+            nodes: vec![1.0],
+            is_corner: vec![true],
+        };
+        shown(&table, &form(3.0, 0.0), &form(3.0 * x, 3.0 * change), limit)
+    }
+
+    #[test]
+    fn a_limit_holds_below_it_and_is_violated_above() {
+        for limit in [0.7, 1.6, 4.0] {
+            assert!(matches!(judged(limit * (1.0 - 1e-9), 0.0, limit), CellResult::Holds));
+            assert!(matches!(judged(limit * (1.0 + 1e-3), 0.0, limit), CellResult::Violated));
+            // Within rounding neither is certain.
+            assert!(matches!(judged(limit * (1.0 + 1e-8), 0.0, limit), CellResult::TooWide));
+            // What changes along the interval counts, too.
+            assert!(matches!(judged(0.9 * limit, 0.09 * limit, limit), CellResult::Holds));
+            assert!(matches!(judged(0.9 * limit, 0.11 * limit, limit), CellResult::TooWide));
+        }
+    }
+}

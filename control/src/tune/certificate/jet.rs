@@ -183,6 +183,10 @@ mod tests {
             assert!(encloses(&whole, |t| one(t).exp() * held(other(t)) + other(t).exp() - 1.0));
             let inverse = (Jet::turning(a, b) + Jet::ONE * 1.5).inverse();
             assert!(encloses(&inverse, |t| (one(t).exp() + 1.5).inv()));
+            // Each by itself, where no other radius covers it.
+            assert!(encloses(&Jet::turning(a, b), |t| one(t).exp()));
+            assert!(encloses(&Jet::turning_less_one(c, d), |t| other(t).exp() - 1.0));
+            assert!(encloses(&Jet::held(c, d), |t| held(other(t))));
             // A cubic is the first function that needs its radius.
             assert!(Jet::turning(a, b).radius < 1.1 * b.powi(3) / 6.0 + 1e-13);
         }

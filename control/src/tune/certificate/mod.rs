@@ -331,3 +331,36 @@ impl Search<'_> {
         Ok(Some(Violation { factor, corner, margins }))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::Case;
+    use crate::tune::Tuning;
+
+    /// The worst axis of a family is worse than the nominal one, and than each with one parameter at an end.
+    #[test]
+    fn a_search_finds_a_worse_axis_than_the_nominal_one() {
+        let folder = format!("{}/../stages/sollmann-jouaneh/controllers", env!("CARGO_MANIFEST_DIR"));
+        let case = Case::read_with(format!("{folder}/pid.toml"), &[]).unwrap();
+        let design = case.controller.as_ref().unwrap();
+        let feedback = Feedback::new(design, &case.machine).unwrap();
+        let family = Family::new(&case, &Tuning::default()).unwrap();
+        let search = Search { family: &family, design, feedback: &feedback, limits: [2.0, 2.0] };
+        let nominal = family.nominal();
+        let (corner, worst) = search.worst(1.0, &nominal).unwrap();
+        assert!(
+            corner.off.iter().any(|off| *off != 0.0) && corner.off.iter().all(|off| off.abs() <= 1.0),
+            "{corner:?}"
+        );
+        assert!(worst > search.excess(&nominal).unwrap());
+        for unknown in family.leading() {
+            for off in [-1.0, 1.0] {
+                let mut other = nominal.clone();
+                family.put(&mut other, unknown, off);
+                let excess = search.excess(&other).unwrap();
+                assert!(worst >= excess, "{unknown} {off}: {excess} {worst}");
+            }
+        }
+    }
+}

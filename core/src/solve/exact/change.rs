@@ -158,3 +158,33 @@ impl<const N: usize> Core<N> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::friction::{Friction, Motion};
+    use crate::mechanism::testing::body;
+    use crate::mechanism::{Body, State, Status};
+    use crate::solve::Event;
+    use crate::solve::exact::Space;
+
+    #[test]
+    fn a_cart_that_friction_stops_does_not_stop_by_rounding() {
+        for sign in [1.0, -1.0] {
+            let cart = Body { friction: Friction::symmetric(2.0, 1.0), force: 0.4 * sign, ..body(0, 1.0) };
+            let mechanism = Mechanism::new(vec![cart], Vec::new(), Vec::new());
+            let mut start = State::default();
+            start.speed[0] = 0.3 * sign;
+            let space = Arc::new(Space::new(&mechanism, 0));
+            let mut core = Core::<16>::new(Arc::new(mechanism), space, &start, (1e-3, f64::INFINITY), Vec::new());
+            let mut events = Vec::new();
+            core.go_on_to(1.0, &mut events).unwrap();
+            assert_eq!(events.len(), 1, "{events:?}");
+            let Event { time, to, load, by_rounding, .. } = events[0];
+            // v̇ = −2 v − 0.6: v = 0 at ½ ln 2
+            assert!((time - 0.5 * 2.0_f64.ln()).abs() < 1e-12 && !by_rounding, "{events:?}");
+            assert_eq!(to, Status::Motion(Motion::Stuck));
+            assert!((load - 0.4 * sign).abs() < 1e-12, "{load}");
+        }
+    }
+}

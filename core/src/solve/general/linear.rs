@@ -692,4 +692,19 @@ mod tests {
         let want = series.at(8, 0.25);
         assert!((quarter[0] - want[0]).abs() < 1e-14 && (quarter[1] - want[1]).abs() < 1e-14);
     }
+
+    /// A vibration of 1000/s and a decay of 3000/s that it drives, with lengths in any unit; and a chain.
+    #[test]
+    fn the_norm_is_about_the_fastest_rate_in_any_unit() {
+        for unit in [1.0, 1e-3, 1e3] {
+            let mut columns = vec![[0.0; STATES]; 8];
+            (columns[1][0], columns[0][1], columns[1][1]) = (1.0 / unit, -1e6 * unit, -2.0);
+            (columns[1][2], columns[2][2]) = (5.0, -3000.0);
+            let found = norm(8, &columns);
+            assert!((3000.0..4000.0).contains(&found), "{unit}: {found}");
+        }
+        let mut columns = vec![[0.0; STATES]; 8];
+        columns[1][0] = 4.0;
+        assert_eq!(norm(8, &columns), 2.0);
+    }
 }

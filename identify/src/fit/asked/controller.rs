@@ -81,3 +81,49 @@ fn filled(log: &Log, quantity: Quantity, arm: f64) -> Option<Vec<f64>> {
     });
     Some(filled.collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::log::Output;
+    use crate::signal::Hold;
+
+    /// A log that deviates from its mean twice as much as the controller's output: half of it is reproduced.
+    #[test]
+    fn an_input_is_reproduced_by_the_share_of_its_deviation() {
+        let file = format!("{}/../stages/sollmann-jouaneh/controllers/pid.toml", env!("CARGO_MANIFEST_DIR"));
+        let case = Case::read_with(&file, &["controller.delay=\"0 s\"", "controller.limit=\"1000 V\""]).unwrap();
+        let design = case.controller.as_ref().unwrap();
+        let (every, r) = (design.every, case.machine.pulley_radius);
+        let time: Vec<f64> = (0..300).map(|k| every * f64::from(k)).collect();
+        let reference: Vec<f64> = time.iter().map(|t| 0.01 * (20.0 * t).sin()).collect();
+        let position: Vec<f64> = time.iter().map(|t| 0.009 * (20.0 * t - 0.1).sin()).collect();
+        let profile = Profile::sampled(&time, &reference);
+        let (mut controller, lead) = (Standard::new(design, &case.machine).unwrap(), Loop::new(design).lead);
+        let commands: Vec<f64> = time
+            .iter()
+            .zip(&position)
+            .map(|(&time, &position)| {
+                let (reference, ahead) = (profile.at(time), profile.at(time + lead));
+                controller.step(&Observation { time, reference, ahead, position, ..Observation::default() })
+            })
+            .collect();
+        let angle = position.iter().map(|x| x / r).collect();
+        let mean = commands.iter().sum::<f64>() / commands.len() as f64;
+        let log = |share: f64| Log {
+            name: "a".into(),
+            file: Default::default(),
+            time: time.clone(),
+            inputs: vec![commands.iter().map(|command| mean + (command - mean) / share).collect()],
+            added: None,
+            hold: Hold::Zero,
+            reference: Some(reference.clone()),
+            outputs: vec![Output { quantity: Quantity::DriveAngle, absolute: false, values: Vec::clone(&angle) }],
+            ended: None,
+        };
+        for (share, percent) in [(1.0, 100.0), (0.5, 50.0), (0.8, 80.0)] {
+            let found = reproduced(&case, &log(share)).unwrap();
+            assert!((found - percent).abs() < 1e-6, "{share}: {found}");
+        }
+    }
+}

@@ -87,3 +87,25 @@ fn later(input: &Signal, from: f64) -> Option<Signal> {
     }
     Some(Signal::Sampled { times: own_times, values: own_values, hold: *hold })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sampled_input_goes_on_from_a_later_time() {
+        let times = vec![0.0, 0.1, 0.25, 0.4, 0.7];
+        let values = vec![1.0, -2.0, 3.0, 0.5, 4.0];
+        for hold in [Hold::Zero, Hold::Linear] {
+            let whole = Signal::Sampled { times: times.clone(), values: values.clone(), hold };
+            for from in [0.0, 0.05, 0.1, 0.3, 0.4, 0.65] {
+                let rest = later(&whole, from).unwrap();
+                for after in [0.0, 0.01, 0.04, 0.11, 0.2, 0.3, 1.0] {
+                    let (own, known) = (rest.value(after), whole.value(from + after));
+                    assert!((own - known).abs() < 1e-9, "{hold:?} {from} {after}: {own} {known}");
+                }
+            }
+        }
+        assert!(later(&Signal::Step { value: 1.0, at: 0.0 }, 0.1).is_none());
+    }
+}

@@ -968,4 +968,26 @@ pub(crate) mod tests {
         assert_eq!(problem.steps(&at, 0), None);
         assert_eq!(problem.simulations, before + 1);
     }
+
+    /// A tenth of the motor's force at the greatest input, in proportion to it.
+    #[test]
+    fn a_friction_that_may_be_zero_has_the_size_of_the_motors_force() {
+        let (case, plan) = case(false);
+        let problem = Problem::new(&case, &plan).unwrap();
+        let machine = &case.machine;
+        let free = Free::new(machine, "cart.friction.coulomb", &[], &[]).unwrap();
+        let (motor, r) = (&machine.drives[0].motor, machine.pulley_radius);
+        let most = problem.runs[0].logged[0].iter().fold(0.0, |most: f64, u| most.max(u.abs()));
+        assert!(most > 0.0);
+        for share in [1.0, 1e-3 / most, 1e3] {
+            let mut run = problem.runs[0].clone();
+            run.logged.iter_mut().flatten().for_each(|u| *u *= share);
+            let found = typical(machine, &free, &[run]).unwrap();
+            let force = motor.torque_constant * motor.gear_ratio / motor.resistance / r
+                * machine.drives[0].amplifier.gain.abs()
+                * most
+                * share;
+            assert!((found / (0.1 * force) - 1.0).abs() < 1e-12, "{share}: {found} {force}");
+        }
+    }
 }

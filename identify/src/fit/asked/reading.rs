@@ -92,3 +92,30 @@ impl Reading {
         (self.parts.iter().map(slope).sum(), deviation / below.sqrt())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::problem::Problem;
+    use crate::fit::asked::problem::tests::case;
+
+    /// x = r φ by the angle, or the position of the cart itself; and the speed of a straight line.
+    #[test]
+    fn a_position_is_read_from_an_angle_or_directly() {
+        let (case, plan) = case(false);
+        let mut run = Problem::new(&case, &plan).unwrap().runs[0].clone();
+        let r = case.machine.pulley_radius;
+        assert_eq!([0, 1].map(|k| run.seen[k].quantity), [Quantity::DriveAngle, Quantity::CartPosition]);
+        let time = run.time.clone();
+        for (seen, factor) in run.seen.iter_mut().zip([1.0 / r, 1.0]) {
+            seen.values = time.iter().map(|t| factor * (0.3 + 0.2 * t)).collect();
+        }
+        for _ in 0..2 {
+            let own = Reading::new(&run, &case.machine, 0).unwrap();
+            assert!(own.values(&run).iter().zip(&time).all(|(x, t)| (x - 0.3 - 0.2 * t).abs() < 1e-12));
+            assert!((own.speed_at_start(&run, |_| None).0 - 0.2).abs() < 1e-9);
+            run.seen.remove(0);
+        }
+        assert!(Reading::new(&run, &case.machine, 0).is_none());
+    }
+}

@@ -56,3 +56,29 @@ impl Information {
         if own.is_finite() { own.min(0.3) } else { 0.1 }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::problem::tests::case;
+    use crate::fit::asked::residuals::{Differences, Residuals};
+
+    /// With derivatives J of one parameter, the error is 1/√(1 + s²) by both criteria: 1 without information.
+    #[test]
+    fn the_error_falls_from_one_in_proportion_to_the_information() {
+        let (case, plan) = case(false);
+        let (case, plan) = (Box::leak(Box::new(case)), Box::leak(Box::new(plan)));
+        let mut problem = Problem::new(case, plan).unwrap();
+        let (x, bounds) = (problem.start(), problem.bounds());
+        let mut residuals = vec![0.0; problem.rows()];
+        let jacobian = problem.linearised(&x, &mut residuals, &bounds, &Differences::Central).unwrap();
+        let scores = [1e-9, 1.0, 1e3, 1e6].map(|factor| {
+            let found = Information::new(problem.clone(), &jacobian * factor, x.clone(), &[0]).unwrap();
+            let [one, other] = [Criterion::D, Criterion::A].map(|criterion| found.score(criterion));
+            assert!((one / other - 1.0).abs() < 1e-12, "{one} {other}");
+            one
+        });
+        assert!((scores[0] - 1.0).abs() < 1e-6 && scores[1] < 1.0, "{scores:?}");
+        assert!((scores[2] / scores[3] - 1e3).abs() < 1.0, "{scores:?}");
+    }
+}

@@ -359,3 +359,27 @@ impl Task<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::Request;
+    use super::*;
+    use crate::case::TEMPLATE;
+
+    #[test]
+    fn machines_in_doubt_have_each_parameter_on_both_sides() {
+        let case = Case::from_text("axis.toml", TEMPLATE).unwrap();
+        let names = ["cart.mass", "cart.friction.coulomb"].map(String::from).to_vec();
+        let machines = |doubt: f64| {
+            let request = Request { names: names.clone(), doubt, ..Request::default() };
+            let task = Task::new(&case, &request, &|| false).unwrap();
+            (parameters(&task.case.machine, &task.plan, &[]).unwrap().len(), doubtful(&task).unwrap())
+        };
+        let (count, all) = machines(0.1);
+        assert_eq!(all.len(), 2 * count);
+        let own = case.machine.cart.mass;
+        let masses: Vec<f64> = all.iter().map(|one| one.cart.mass / own).filter(|share| *share != 1.0).collect();
+        assert!(masses.len() == 2 && (masses[0] - 0.9).abs() < 1e-12 && (masses[1] - 1.1).abs() < 1e-12, "{masses:?}");
+        assert!(machines(0.0).1.is_empty());
+    }
+}

@@ -388,4 +388,21 @@ mod tests {
             assert!(((force - low) / half - 1.0).abs() < 0.01, "{force} {low} {high}: {half}");
         }
     }
+
+    /// A tenth of the amplitude is lost at the shortest period: a line through points keeps the square of sin(x)/x with
+    /// x = πh/λ, a Gaussian exp(−(2πσ/λ)²/2), and a motor before the belt of f₁ reports 1/(1 − (v/(λ f₁))²).
+    #[test]
+    fn the_shortest_period_loses_a_tenth_of_its_amplitude() {
+        let machine = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
+        let (period, limit) = resolution(&machine, (1e-9, 2e-3, 1e-6)).unwrap();
+        let x = PI * 2e-3 / period;
+        assert!(limit == Limit::Points && ((x.sin() / x).powi(2) - 0.9).abs() < 0.005, "{period}");
+        let (period, limit) = resolution(&machine, (2e-3, 1e-6, 1e-6)).unwrap();
+        let kept = (-0.5 * (2.0 * PI * 2e-3 / period).powi(2)).exp();
+        assert!(limit == Limit::Smoothing && (kept - 0.9).abs() < 1e-9, "{period} {kept}");
+        let (period, limit) = resolution(&machine, (1e-9, 1e-9, 0.5)).unwrap();
+        let first = Natural::frequencies(&machine.mechanism(), &[0.0; BODIES]).unwrap()[0];
+        let more = 1.0 / (1.0 - (0.5 / (period * first)).powi(2));
+        assert!(limit == Limit::Resonance && (more - 1.1).abs() < 1e-9, "{period} {more}");
+    }
 }

@@ -248,6 +248,11 @@ mod tests {
         assert!((all[0].size - 3.0).abs() < 1e-9 && (all[1].size - 1.0).abs() < 1e-9);
         // √(2/n) of each by itself; neighbours and the cubic add little.
         assert!(all.iter().all(|own| (0.9..1.1).contains(&own.inflation)));
+        // Cramér and Rao's bound of a wave number, √6/(π a n^{3/2} h), for noise of deviation 1.
+        for (own, size) in all.iter().zip([3.0, 1.0]) {
+            let bound = 6f64.sqrt() / (PI * size * 250f64.powf(1.5) * STEP);
+            assert!((own.number / bound - 1.0).abs() < 0.1, "{} {bound}", own.number);
+        }
     }
 
     #[test]

@@ -125,4 +125,30 @@ mod tests {
         // It explains all: ½ Σ r²
         assert!((gained - 0.5 * square).abs() < 1e-9 * square, "{gained}");
     }
+
+    /// There and back, with a wave and a little of another one: in any unit the same wave, of as many that are tried.
+    #[test]
+    fn a_wave_is_found_in_any_unit() {
+        let found = [1e-3, 1.0, 1e3].map(|unit| {
+            let ways: Vec<f64> = (0..100).map(|k| 0.004 * f64::from(k)).collect();
+            let value: Vec<f64> = ways.iter().chain(ways.iter().rev()).map(|way| unit * way).collect();
+            let row = |x: &f64| 0.3 * (40.0 * x / unit).cos() + 0.01 * (123.0 * x / unit).sin();
+            let n = value.len();
+            let series = Series {
+                moved: Vec::new(),
+                own: 0,
+                more: 0,
+                rows: value.iter().map(row).collect(),
+                gain: vec![1.0; n],
+                time: value.clone(),
+                speed: value.clone(),
+                value,
+            };
+            let found = wave(&[series], &[], &[], 1e-4).unwrap();
+            assert!((found.kappa * unit / 40.0 - 1.0).abs() < 0.02, "{unit}: {}", found.kappa);
+            assert!((found.travel / unit - 0.396).abs() < 1e-9 && (found.amplitude - 0.3).abs() < 0.02);
+            found.tried
+        });
+        assert!(found[0] > 10 && found.iter().all(|tried| tried.abs_diff(found[0]) <= 1), "{found:?}");
+    }
 }

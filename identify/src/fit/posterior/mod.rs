@@ -339,3 +339,40 @@ fn priors<'a>(scales: &'a [Scale<'a>], plan: &Plan, bounds: &mut Bounds) -> Resu
     }
     Ok(all)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Draws that are not told apart from converged ones, but for one variable.
+    #[test]
+    fn the_worst_variable_is_named() {
+        let credible = |(name, r_hat, effective): (&str, f64, f64)| Credible {
+            name: name.into(),
+            unit: "",
+            mean: 0.0,
+            deviation: 1.0,
+            median: 0.0,
+            interval: [-2.0, 2.0],
+            r_hat,
+            effective,
+        };
+        let doubts = |all: &[(&str, f64, f64)]| {
+            let chains = vec![vec![vec![0.0; all.len()]; 500]; 4];
+            let draws = Draws { chains, divergences: 0, evaluations: 0, interrupted: false };
+            let variables = all.iter().copied().map(credible).collect();
+            Posterior { variables, globals: all.len(), draws, inflation: 1.0, fixed_slopes: false }.doubts()
+        };
+        assert_eq!(doubts(&[("a", 1.0, 2000.0), ("b", 1.001, 1500.0)]), Vec::<String>::new());
+        let bad = [("a", 1.0, 2000.0), ("b", 1.5, 900.0), ("c", 1.2, 3.0), ("d", 1.0, 1000.0)];
+        for shift in 0..bad.len() {
+            let mut all = bad;
+            all.rotate_left(shift);
+            let found = doubts(&all);
+            assert!(found.len() == 2 && found[0].contains("of b is 1.500"), "{found:?}");
+            assert!(found[1].starts_with("c has 3 effective draws"), "{found:?}");
+        }
+        // A number that cannot be computed is worse than any.
+        assert!(doubts(&[("a", 1.5, 2000.0), ("b", f64::NAN, 1500.0)])[0].contains("of b is NaN"));
+    }
+}

@@ -285,3 +285,28 @@ fn balance(seen: &[(DVector<f64>, f64)]) -> Vec<f64> {
     }
     weights
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A piece of second derivative I is a parabola: φ(u + d) = φ − α + g̃·d + ½ ‖d‖² for any u and d.
+    #[test]
+    fn a_piece_is_the_same_parabola_from_every_point() {
+        let minimum = DVector::from_vec(vec![0.3, -1.2]);
+        let value = |at: &DVector<f64>| 2.0 + 0.5 * (at - &minimum).norm_squared();
+        let y = DVector::from_vec(vec![1.5, 0.7]);
+        let piece = Piece { x: Vec::new(), cost: value(&y), gradient: &y - &minimum, y };
+        for k in 0..10 {
+            let at =
+                |phase: f64| DVector::from_vec(vec![(phase + f64::from(k)).sin(), (2.0 * phase - f64::from(k)).cos()]);
+            let (u, d) = (at(0.2), at(1.9));
+            // The present cost lies above the piece, as at a kink.
+            let cost = value(&u) + 0.4;
+            let (gradient, below) = piece.seen_from(&u, cost);
+            assert!((below - 0.4).abs() < 1e-12, "{k}: {below}");
+            let own = cost - below + gradient.dot(&d) + 0.5 * d.norm_squared();
+            assert!((own - value(&(&u + &d))).abs() < 1e-12, "{k}: {own}");
+        }
+    }
+}

@@ -590,11 +590,33 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::asked::problem::tests::case;
 
     #[test]
     fn efforts_add_up() {
         let mut work = Work { iterations: 1, evaluations: 20, simulations: 300 };
         work.add(&Work { iterations: 4, evaluations: 50, simulations: 600 });
         assert_eq!(work, Work { iterations: 5, evaluations: 70, simulations: 900 });
+    }
+
+    /// Residuals of three deviations of the noise in the worst output, whatever its weights.
+    #[test]
+    fn residuals_are_told_in_deviations_of_the_noise() {
+        let (case, plan) = case(false);
+        let mut problem = Problem::new(&case, &plan).unwrap();
+        let x = problem.start();
+        let bounds = problem.bounds();
+        let mut at = Minimum::linearised(&mut problem, &x, &bounds).unwrap();
+        let noise = problem.noise();
+        let (first, n) = (problem.first_row(0), problem.runs[0].time.len());
+        for (output, times) in [(0, 1.0), (1, 3.0)] {
+            let seen = &problem.runs[0].seen[output];
+            let deviation = noise.deviation(seen.quantity);
+            for (k, weight) in seen.weights.iter().enumerate() {
+                let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+                at.residuals[first + output * n + k] = sign * times * deviation * weight;
+            }
+        }
+        assert!((times_noise(&problem, &at) - 3.0).abs() < 1e-9, "{}", times_noise(&problem, &at));
     }
 }

@@ -389,3 +389,31 @@ impl EndOfFit<'_> {
         Some(OtherLaw { key: kind.key(), body: body.key(), words, explained, standard_errors, gain, off, added })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::{Case, TEMPLATE};
+
+    /// Friction that drifts rises along a log, one that sways rises first, and one with sides is larger forward.
+    #[test]
+    fn a_positive_amplitude_is_more_friction_late_early_or_forward() {
+        let machine = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
+        let coulomb = |kind: AlternativeLaw, share: f64| {
+            let mut machine = machine.clone();
+            Candidate { body: Body::Cart, kind, coulomb: 1.0 }.put(&mut machine, 0.1, share);
+            let friction = &machine.cart.friction;
+            [friction.forward.coulomb, friction.backward.coulomb]
+        };
+        let own = machine.cart.friction.forward.coulomb;
+        assert!(own > 0.0);
+        let is = |found: [f64; 2], known: [f64; 2]| found.iter().zip(known).all(|(a, b)| (a - b).abs() < 1e-12);
+        for (share, factor) in [(0.0, 0.9), (0.5, 1.0), (1.0, 1.1)] {
+            assert!(is(coulomb(AlternativeLaw::Drift, share), [factor * own; 2]), "{share}");
+        }
+        for (share, factor) in [(0.0, 1.0), (0.25, 1.1), (0.75, 0.9)] {
+            assert!(is(coulomb(AlternativeLaw::Sway, share), [factor * own; 2]), "{share}");
+        }
+        assert!(is(coulomb(AlternativeLaw::Sided, 0.3), [own + 0.1, own - 0.1]));
+    }
+}

@@ -299,3 +299,19 @@ fn has(problem: &Problem, quantity: Quantity) -> bool {
 fn knows_current(problem: &Problem) -> bool {
     has(problem, Quantity::MotorCurrent) || problem.machine.drives[0].amplifier.mode == AmplifierMode::Current
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::problem::tests::case;
+
+    /// An encoder at the cart is as fine as the present one: along the belt, if that measures an angle.
+    #[test]
+    fn an_encoder_at_the_cart_has_the_resolution_of_the_present_one() {
+        let (case, plan) = case(false);
+        let problem = Problem::new(&case, &plan).unwrap();
+        assert_eq!(cart_noise(&problem, &[(Quantity::CartSpeed, 0.1), (Quantity::CartPosition, 2e-6)]), 2e-6);
+        assert_eq!(cart_noise(&problem, &[(Quantity::DriveAngle, 1e-3)]), 1e-3 * case.machine.pulley_radius);
+        assert_eq!(cart_noise(&problem, &[]), 10e-6);
+    }
+}

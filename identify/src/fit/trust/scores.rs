@@ -184,3 +184,27 @@ impl LogFit {
         self.name.split_once('/').map_or(&self.name, |(experiment, _)| experiment)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A model that is the mean of a log explains nothing of it, one that deviates by half as much half.
+    #[test]
+    fn percentages_are_shares_of_the_deviation_from_the_mean() {
+        let seen = [1.0, 2.0, f64::NAN, 3.0, 6.0];
+        let percent = |share: f64| {
+            let model: Vec<f64> = seen.iter().map(|seen| 3.0 + share * (seen - 3.0)).collect();
+            let own = score(&seen, &model, 0..5).unwrap();
+            assert_eq!(own.count, 4);
+            // Σ (y − 3)² = 4 + 1 + 0 + 9
+            assert!((own.rmse - (1.0 - share).abs() * (14.0_f64 / 4.0).sqrt()).abs() < 1e-12, "{own:?}");
+            assert!((own.worst - 3.0 * (1.0 - share).abs()).abs() < 1e-12, "{own:?}");
+            own.percent
+        };
+        for (share, known) in [(1.0, 100.0), (0.5, 50.0), (0.0, 0.0), (-1.0, -100.0)] {
+            assert!((percent(share) - known).abs() < 1e-9, "{share}");
+        }
+        assert!(score(&[f64::NAN], &[1.0], 0..1).is_none());
+    }
+}

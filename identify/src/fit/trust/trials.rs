@@ -287,3 +287,25 @@ fn descend(problem: &mut Problem, plan: &Plan, start: &[f64], iterations: usize)
     let is_good = !matches!(ending, Ending::Failed | Ending::Interrupted) && cost.is_finite();
     is_good.then_some(End { x, residuals, cost })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::problem::tests::case;
+
+    /// Missing values have no weight and no residual.
+    #[test]
+    fn mean_squares_are_over_the_rows_with_a_weight() {
+        let (case, plan) = case(false);
+        let mut problem = Problem::new(&case, &plan).unwrap();
+        let n = problem.runs[0].time.len();
+        let mut residuals = vec![3.0; problem.rows()];
+        for k in (0..n).step_by(3) {
+            problem.runs[0].seen[0].weights[k] = 0.0;
+            residuals[k] = 0.0;
+        }
+        for (quantity, mean) in squares(&problem, &residuals) {
+            assert!((mean - 9.0).abs() < 1e-12, "{}: {mean}", quantity.name());
+        }
+    }
+}

@@ -1,5 +1,6 @@
 //! Small changes of a source file: what a slip of the hand could make of it.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
@@ -107,13 +108,20 @@ fn gather(folder: &str, files: &mut Vec<String>) -> Result<(), String> {
     Ok(())
 }
 
-/// Another order, by a generator of Knuth's (MMIX).
+/// Sorts changes by a hash of the seed, the changed text and its place in words, not in lines.
+///
+/// An edit of the source removes the changes of the edited code and adds others, whose hashes decide whether they are
+/// drawn. All other changes keep their order, so that two hunts with the same seed can be compared.
 pub fn shuffle(changes: &mut [Change], seed: u64) {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    for k in (1..changes.len()).rev() {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        changes.swap(k, ((state >> 33) % (k as u64 + 1)) as usize);
-    }
+    // How many changes with the same words stand before it.
+    let mut alike: BTreeMap<String, usize> = BTreeMap::new();
+    let mut hash = |change: &Change| {
+        let words = format!("{seed}\n{}\n{}\n{}\n{}", change.file, change.within, change.was, change.will);
+        let before = alike.entry(words.clone()).or_default();
+        *before += 1;
+        crate::data::sum(format!("{words}\n{before}").as_bytes())
+    };
+    changes.sort_by_cached_key(|change| hash(change));
 }
 
 struct Finder<'a> {
@@ -293,6 +301,23 @@ impl<'a> Visit<'a> for Finder<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_edit_leaves_the_order_of_all_other_changes() {
+        let order = |text: &str, seed| {
+            let mut changes = of_text("a.rs", text).unwrap();
+            shuffle(&mut changes, seed);
+            changes.iter().map(|change| (change.was.clone(), change.will.clone())).collect::<Vec<_>>()
+        };
+        let text = "fn sum(a: f64, b: f64, c: f64) -> f64 { (a + b) - (a * c) + (b / c) + (a + b) }";
+        let edited = format!("fn none(b: bool) -> bool {{ !b }}\n\n{}", text.replace("(b / c)", "c"));
+        let before = order(text, 1);
+        let kept: Vec<_> = order(&edited, 1).into_iter().filter(|change| before.contains(change)).collect();
+        let expected: Vec<_> = before.iter().filter(|(was, _)| !was.contains("b / c")).cloned().collect();
+        assert_eq!(kept, expected);
+        assert_ne!(order(text, 2), before);
+        assert_eq!(expected.iter().filter(|(was, _)| was == "a + b").count(), 2);
+    }
 
     #[test]
     fn a_comparison_is_evaluated_once_and_reached_where_its_result_differs() {

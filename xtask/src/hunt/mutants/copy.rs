@@ -393,7 +393,9 @@ fn source(listed: &BTreeSet<&str>) -> Result<String, String> {
         {
             let text = fs::read_to_string(name).map_err(|error| format!("{name}: {error}"))?;
             all.push_str(name);
-            all.push_str(text.split("\n#[cfg(test)]\nmod ").next().unwrap_or_default());
+            let tests = ["mod tests {", "pub(crate) mod tests {"].map(|module| format!("\n#[cfg(test)]\n{module}"));
+            let end = tests.iter().filter_map(|begin| text.find(begin)).min();
+            all.push_str(&text[..end.unwrap_or(text.len())]);
         }
     }
     Ok(all)

@@ -245,3 +245,38 @@ impl Stretch {
 fn sum_of_logs(a: f64, b: f64) -> f64 {
     a.max(b) + log1p(exp(-(a - b).abs()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_pcg::rand_core::SeedableRng;
+
+    fn standard(x: &[f64], gradient: &mut [f64]) -> Option<f64> {
+        gradient.iter_mut().zip(x).for_each(|(slope, x)| *slope = -1e4 * x);
+        Some(-0.5 * x.iter().map(|x| 1e4 * x * x).sum::<f64>())
+    }
+
+    /// Leapfrog steps are symmetric in time, and nearly keep the energy.
+    #[test]
+    fn a_step_back_ends_where_the_step_forth_began() {
+        let mut chain = Chain::new(&standard, &|| true, &[3e-3, -1e-2], Pcg64::seed_from_u64(2)).unwrap();
+        chain.step = 1e-3;
+        chain.kick();
+        let from = chain.at.clone();
+        let to = chain.leap(&from, PathDirection::Forth);
+        let back = chain.leap(&to, PathDirection::Back);
+        assert!((&to.position - &from.position).norm() > 1e-4 && (to.energy() - from.energy()).abs() < 0.02);
+        assert!((back.position - &from.position).norm() < 1e-14 && (back.momentum - &from.momentum).norm() < 1e-12);
+    }
+
+    /// A normal distribution of deviation 0.01 takes steps of about that, whatever the first one was.
+    #[test]
+    fn the_first_step_is_of_the_size_of_the_distribution() {
+        for begun in [1e-6, 1.0, 1e4] {
+            let mut chain = Chain::new(&standard, &|| true, &[3e-3, -1e-2], Pcg64::seed_from_u64(2)).unwrap();
+            chain.step = begun;
+            chain.find_step();
+            assert!((1e-3..0.1).contains(&chain.step), "{begun}: {}", chain.step);
+        }
+    }
+}
