@@ -1,5 +1,6 @@
 //! Planned moves: within the limits on every axis, sooner than what the file has, and never sooner than can be.
 
+use crate::common::chance::Chance;
 use crate::common::experiment;
 use rand_pcg::Pcg64;
 use std::path::Path;
@@ -331,6 +332,53 @@ fn a_path_is_planned_within_the_limits_of_all_motors() {
         let text = plans.case_text(&case, Path::new("planned.toml")).unwrap();
         let written = Case::from_text("planned.toml", &text).unwrap();
         assert!((written.moves[0].end() - planned.profiles[0].end()).abs() < 1e-12);
+    }
+}
+
+/// Strokes of 0.3 mm to 0.3 m in any direction, along one to three legs, on each kind of gantry: the case that is written
+/// is within its window when the plan states it, its references leave the reserve, and hardly a command is limited.
+#[test]
+fn strokes_of_all_gantries_are_reached_when_their_plans_say() {
+    let count = std::env::var("TAUT_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(6);
+    for seed in 0..count {
+        let mut chance = Chance::new(8800 + seed);
+        let kind = ["h-frame", "core-xy", "dual-belt"][(seed % 3) as usize];
+        let (mut at, mut points, mut until) = ([0.0f64; 2], Vec::new(), 0.5);
+        for _ in 0..1 + (3.0 * chance.uniform()) as usize {
+            let (length, angle) = (chance.scaled(3e-4, 0.3), std::f64::consts::TAU * chance.uniform());
+            // Within the travel of the stages.
+            at = [(at[0] + length * angle.cos()).clamp(-0.09, 0.09), (at[1] + length * angle.sin()).clamp(-0.09, 0.09)];
+            points.push(format!("[{}, {}]", at[0], at[1]));
+            // At 0.4 m/s and 4 m/s².
+            until += length / 0.4 + 0.1;
+        }
+        let motion = format!(
+            "move=[{{ name = \"stroke\", points = [{}], speed = 0.4, acceleration = 4, until = {until} }}]",
+            points.join(", ")
+        );
+        let case = gantry(kind, &motion);
+        let design = case.controller.as_ref().unwrap();
+        let plans = plan(&case, &[0], &FREE, &|| false).unwrap_or_else(|error| panic!("{kind} {motion}: {error}"));
+        let planned = &plans.moves[0];
+        let taken = loads(&case.machine, design.bounds(), &planned.profiles);
+        let taken = taken.iter().map(|load| load.share()).fold(0.0, f64::max);
+        let [own, given] = [&planned.best.arrival, &planned.given].map(|arrival| arrival.nominal);
+        println!("{seed} {kind} {motion}: {own:?} s, {given:?} s, {taken}");
+        assert!(planned.is_kept || taken <= 0.9 * (1.0 + 1e-9), "{kind} {motion}: {taken}");
+        assert!(planned.is_kept || own.unwrap() < given.unwrap_or(f64::INFINITY), "{kind} {motion}");
+        let written = Case::from_text("planned.toml", &plans.case_text(&case, Path::new("planned.toml")).unwrap());
+        let written = written.unwrap_or_else(|error| panic!("{error}"));
+        let (design, motion) = (written.controller.as_ref().unwrap(), &written.moves[0]);
+        assert_eq!(motion.shortfalls(&written.machine, design), []);
+        let setup =
+            Setup { window: motion.window, ..Setup::new(&written.machine, design, &motion.profiles, motion.until) };
+        let run = closed_loop(&setup).unwrap();
+        let arrival = run.figures.settling.map(|late| late + motion.end());
+        let stated = if planned.is_kept { given } else { own };
+        assert!((arrival.unwrap() - stated.unwrap()).abs() < 1e-9, "{kind}: {arrival:?} s instead of {stated:?} s");
+        // The reserve is that of the reference: a loop that brakes hard may still reach the limit for a few samples.
+        let (samples, limited) = run.samples;
+        assert!(50 * limited <= samples, "{kind}: {limited} limited commands of {samples}");
     }
 }
 

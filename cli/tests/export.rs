@@ -7,6 +7,8 @@ mod bounds;
 mod c;
 #[path = "export/how_to.rs"]
 mod how_to;
+#[path = "../../tests/common/steppers.rs"]
+mod in_loop;
 #[path = "export/interpreter.rs"]
 mod interpreter;
 #[path = "export/machines.rs"]

@@ -28,15 +28,21 @@ const WITH_LOGS: [&str; 2] = ["stages/h-frame/belts.toml", "stages/core-xy/belts
 
 /// An axis and a gantry whose motors are commanded positions.
 const STEPPERS: [&str; 2] = ["stages/stepper-axis/stepper-axis.toml", "stages/printer-core-xy/printer.toml"];
+/// The axis with an encoder that corrects its positions.
+const CLOSED_LOOP: &str = "stages/stepper-axis/closed-loop.toml";
+/// Its move, shorter.
+const SHORT: &str = "move=[{ name = \"there and back\", points = [\"5 mm\", \"0 mm\"], speed = \"0.2 m/s\", \
+                     acceleration = \"4 m/s^2\", jerk = \"400 m/s^3\", until = \"0.25 s\" }]";
 
 /// Commands that take a stepper; all others refuse it.
-const WITH_STEPPER: [&str; 14] = [
+const WITH_STEPPER: [&str; 15] = [
     "show",
     "simulate",
     "modes",
     "sweep",
     "move",
     "plan",
+    "learn",
     "check",
     "shape",
     "frf",
@@ -105,8 +111,8 @@ const CALM: &str =
 fn trial(case: &str, options: &[&str], folder: &Path) -> String {
     let out = folder.join("trial").display().to_string();
     let name = options.iter().skip_while(|option| **option != "--move").nth(1).unwrap();
-    let changes =
-        options.iter().filter(|option| option.contains("controller.pid")).flat_map(|option| ["--set", option]);
+    let is_changed = |option: &&&str| option.contains("controller.pid") || **option == SHORT;
+    let changes = options.iter().filter(is_changed).flat_map(|option| ["--set", option]);
     let _ = taut_in(root())
         .args(["move", case, "--move", name, "--no-report", "--out", &out])
         .args(changes)
@@ -125,7 +131,7 @@ fn logged(case: &str, folder: &Path) -> String {
              {{ prbs = \"5 um\", bit = \"2 ms\", seed = {seed} }}] }}"
         )
     };
-    let [input, columns, outputs] = match case == STEPPERS[0] {
+    let [input, columns, outputs] = match case != STEPPERS[1] {
         true => [sliding(20.0, 1), "input = \"input_m\"".into(), "cart_position = \"cart_position_m\"".into()],
         false => [
             format!("{{ left = {}, right = {} }}", sliding(30.0, 1), sliding(10.0, 2)),
@@ -176,7 +182,8 @@ fn every_kind_goes_through_every_command() {
                 .iter()
                 .map(|option| match *option {
                     "there/" => there.as_str(),
-                    "short fast" if case == STEPPERS[0] => "there and back",
+                    "short fast" if case == STEPPERS[0] || case == CLOSED_LOOP => "there and back",
+                    "title=calm" if case == CLOSED_LOOP => SHORT,
                     "short fast" if case != *axis => "square",
                     "title=calm" if case != *axis && !STEPPERS.contains(&case) => CALM,
                     "motor_current=10mA" if GANTRIES.contains(&case) => "left_current=10mA",
@@ -185,11 +192,15 @@ fn every_kind_goes_through_every_command() {
                 .collect();
             let log = if own.contains(&"trial.csv") { trial(case, &own, folder.path()) } else { String::new() };
             let options = own.iter().map(|option| if *option == "trial.csv" { &log } else { *option });
-            let has_stepper = STEPPERS.contains(&case) && WITH_STEPPER.contains(command);
+            let is_closed = case == CLOSED_LOOP;
+            let has_stepper = (is_closed || STEPPERS.contains(&case)) && WITH_STEPPER.contains(command);
             let of_log = has_stepper && ["check", "frf"].contains(command);
             let case = if of_log { &logged(case, folder.path()) } else { case };
             // Fine microsteps and a whole family of machines cost time here, and show nothing more.
             let coarse: &[&str] = match has_stepper {
+                _ if is_closed && !of_log && *command != "learn" => {
+                    &["--set", SHORT, "--set", "tune={ spread = 0, places = 1 }"]
+                }
                 true if *command == "plan" => &["--set", "stepper.microsteps=1", "--set", "tune={ spread = 0 }"],
                 true if of_log => &["--set", "stepper.interpolate=true"],
                 true => &["--set", "stepper.microsteps=1"],
@@ -216,6 +227,13 @@ fn every_kind_goes_through_every_command() {
         match *command {
             "studio" => run(axis, of_gantry),
             _ => run(axis, &Runs),
+        }
+        match *command {
+            // Its case needs a log.
+            "studio" | "fit" => {}
+            "tune" | "export st" => run(CLOSED_LOOP, &Runs),
+            taken if WITH_STEPPER.contains(&taken) => run(CLOSED_LOOP, &Runs),
+            _ => run(CLOSED_LOOP, &NO_MOTOR),
         }
         match *command {
             "studio" => {}

@@ -108,9 +108,9 @@ fn the_template_of_a_printer_has_a_stepper_and_goes_through_its_commands() {
     for command in ["simulate", "move", "shape"] {
         taut_in(root()).args([command, file, "--quiet"]).assert().success();
     }
-    // Its loop is open, and its repetitions are not learned from.
+    // Its loop is open; its repetitions are learned from, if there is a log.
     let learn = ["learn", "--move", "80 mm", "--log", "trial.csv"];
-    for (command, words) in [(&["tune"][..], "has no gains to tune"), (&learn, "this needs a motor")] {
+    for (command, words) in [(&["tune"][..], "has no gains to tune"), (&learn, "there is no such file")] {
         let refused = taut(&[command, &[file]].concat());
         let said = String::from_utf8(refused.stderr).unwrap();
         assert!(refused.status.code() == Some(2) && said.contains(words), "{said}");

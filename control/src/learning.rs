@@ -31,6 +31,9 @@
 //!
 //! with largest singular values instead of magnitudes, and the smallest of T̃₀ for its inversion.
 //!
+//! For a stepper, w corrects the commanded position: T is the response of the machine to its command, around which an
+//! encoder may close a loop.
+//!
 //! M. Norrlöf, S. Gunnarsson, "Time and frequency domain convergence properties in iterative learning control", *Int.
 //! J. Control* 75 (2002) 1114-1126. D. Bristow, M. Tharayil, A. Alleyne, "A survey of iterative learning control",
 //! *IEEE Control Systems Magazine* 26 (2006) 96-114.
@@ -133,14 +136,14 @@ pub struct Point {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct DriveSignal {
-    /// Signal of the trial, V or A.
+    /// Signal of the trial, V or A; m for a stepper.
     pub before: Vec<f64>,
-    /// The next signal, V or A.
+    /// The next signal, V or A; m for a stepper.
     pub next: Vec<f64>,
 }
 
 impl DriveSignal {
-    /// Largest magnitude of the next signal, V or A.
+    /// Largest magnitude of the next signal, V or A; m for a stepper.
     pub fn largest(&self) -> f64 {
         self.next.iter().fold(0.0, |most, w| most.max(w.abs()))
     }
@@ -183,7 +186,7 @@ pub struct Learned {
 }
 
 impl Learned {
-    /// Largest magnitude of the next signals, V or A.
+    /// Largest magnitude of the next signals, V or A; m for steppers.
     pub fn largest(&self) -> f64 {
         self.drives.iter().map(DriveSignal::largest).fold(0.0, f64::max)
     }
@@ -224,7 +227,6 @@ fn learned<const M: usize>(
     before: Option<&[Added]>,
     stop: &dyn Fn() -> bool,
 ) -> Result<Learned> {
-    crate::case::needs_motors(&case.machine)?;
     let Some(design) = &case.controller else {
         return Err(Error::new("there is no controller whose moves could be learned").next("add [controller]"));
     };
@@ -249,7 +251,9 @@ fn learned<const M: usize>(
     let transform = Transform::new(n, every);
     let family = Family::new(case, &case.tune.clone().unwrap_or_default())?;
     let responses = responses(&family, (design, &feedback), trial.at, &transform, stop)?;
-    let rule = Rule::<M>::new(&responses)?;
+    // A commanded position moves its slide by as much, however high the resonance of the field.
+    let most = if case.machine.stepper().is_some() { 1.0 } else { f64::INFINITY };
+    let rule = Rule::<M>::new(&responses, most)?;
     let taper = taper(n, motion.end() / every);
     let predictions = rule.predicted(&responses, &transform, (&errors, &signals), &taper);
     let squared = |is_chosen: &dyn Fn(usize) -> bool| -> f64 {
@@ -490,10 +494,11 @@ struct Predictions {
 }
 
 impl<const M: usize> Rule<M> {
-    fn new(responses: &[Vec<Matrix<M>>]) -> Result<Self> {
+    /// `most` is the largest response relative to which small ones are not inverted.
+    fn new(responses: &[Vec<Matrix<M>>], most: f64) -> Result<Self> {
         let own = &responses[0];
-        let rho: [f64; M] =
-            std::array::from_fn(|row| INVERTIBLE * own.iter().map(|t| t.row(row).norm()).fold(0.0, f64::max));
+        let largest_of = |row: usize| own.iter().map(|t| t.row(row).norm()).fold(0.0, f64::max);
+        let rho: [f64; M] = std::array::from_fn(|row| INVERTIBLE * largest_of(row).min(most));
         // T̃₀ = R⁻¹ T₀
         let scaled = |t: &Matrix<M>| Matrix::<M>::from_fn(|row, column| t[(row, column)] / rho[row]);
         // L = s T̃₀ᴴ (T̃₀ T̃₀ᴴ + 1)⁻¹ R⁻¹

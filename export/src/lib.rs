@@ -202,11 +202,19 @@ fn shaper_note(design: &crate::design::Design) -> Option<String> {
     })
 }
 
-/// The shaper as lines of a comment, with the impulses.
-fn shaper_remark(design: &crate::design::Design) -> Vec<String> {
-    let Some(note) = shaper_note(design) else { return Vec::new() };
+/// Note that the command of a stepper's controller is a correction.
+fn correction_note(machine: &Machine) -> Option<String> {
+    machine.stepper().map(|_| {
+        "the command is a correction: add it to the reference of the motor's part of the belt and command the sum"
+            .into()
+    })
+}
+
+/// Use of the command and the shaper with its impulses, as lines of a comment.
+fn remarks(machine: &Machine, design: &crate::design::Design) -> Vec<String> {
     let of = |[time, amplitude]: &[f64; 2]| format!("  {amplitude:?} of the reference {time:?} s ago");
-    std::iter::once(format!("{note}, to the sum of")).chain(design.shaper.iter().map(of)).collect()
+    let shaper = shaper_note(design).map(|note| format!("{note}, to the sum of"));
+    correction_note(machine).into_iter().chain(shaper).chain(design.shaper.iter().map(of)).collect()
 }
 
 /// The files of a target, called `stem`. Errors: what the target cannot do, and what can be done instead.

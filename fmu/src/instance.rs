@@ -3,6 +3,7 @@
 use std::sync::Arc;
 use taut_control::control::Stepped;
 use taut_core::mechanism::{DRIVES, Mechanism};
+use taut_core::signal::profile::Reference;
 use taut_core::signal::{DEGREE, Piece, shifted};
 use taut_core::solve::{Dynamics, Simulator, Solver};
 use taut_export::fmu::{Model, REFERENCES, Role};
@@ -102,6 +103,11 @@ pub(crate) struct Input {
 }
 
 impl Input {
+    /// True if it does not change by itself.
+    fn is_held(&self) -> bool {
+        self.coefficients[1..].iter().all(|c| *c == 0.0)
+    }
+
     pub(crate) fn at(&self, time: f64) -> f64 {
         let tau = time - self.since;
         self.coefficients.iter().rev().fold(0.0, |sum, c| sum * tau + c)
@@ -359,13 +365,41 @@ impl Instance {
             // The command of a stepper corrects the reference of its part of the belt.
             for (piece, shares) in pieces.iter_mut().zip(machine.belt_shares()) {
                 for (slide, share) in shares.iter().enumerate() {
-                    let Input { since, coefficients } = self.inputs[REFERENCES * slide];
-                    let now = shifted(&coefficients, self.time - since);
+                    let now = self.polynomial(slide);
                     piece.coefficients.iter_mut().zip(now).for_each(|(sum, own)| *sum += share * own);
                 }
             }
         }
         pieces
+    }
+
+    /// The reference of a slide from its five inputs, and the time from which it goes on by its derivatives, s: the last
+    /// one at which an input was set. A position that was set as a polynomial has its own, so that time is now.
+    pub(crate) fn reference(&self, role: fn(usize) -> Role, slide: usize) -> (f64, Reference) {
+        let none = Input { since: self.begin, coefficients: [0.0; DEGREE + 1] };
+        let own: [Input; REFERENCES] = std::array::from_fn(|k| {
+            place(&self.model, role(slide * REFERENCES + k)).map_or(none, |place| self.inputs[place])
+        });
+        let origin = match own[0].is_held() {
+            true => own.iter().map(|input| input.since).fold(f64::NEG_INFINITY, f64::max),
+            false => self.time,
+        };
+        let [position, speed, acceleration, jerk, snap] = own.map(|input| input.at(origin));
+        (origin, Reference { position, speed, acceleration, jerk, snap })
+    }
+
+    /// The reference position of a slide as a polynomial of the time from now on.
+    fn polynomial(&self, slide: usize) -> [f64; DEGREE + 1] {
+        let position = &self.inputs[REFERENCES * slide];
+        if !position.is_held() {
+            return shifted(&position.coefficients, self.time - position.since);
+        }
+        let (origin, reference) = self.reference(Role::Reference, slide);
+        let Reference { position, speed, acceleration, jerk, snap } = reference.after(self.time - origin);
+        let mut coefficients = [0.0; DEGREE + 1];
+        // x(τ) = Σ x⁽ᵏ⁾ τᵏ/k!
+        coefficients[..REFERENCES].copy_from_slice(&[position, speed, acceleration / 2.0, jerk / 6.0, snap / 24.0]);
+        coefficients
     }
 
     /// The forces that the mechanism has as numbers, now.

@@ -1,10 +1,10 @@
 //! Time goes on: steps of co-simulation, and what an integrator asks of model exchange.
 
-use crate::instance::{Instance, Phase, Plant, Refusable, Refusal, Status, place};
+use crate::instance::{Instance, Phase, Plant, Refusable, Refusal, Status};
 use taut_core::mechanism::Shown;
 use taut_core::signal::profile::Reference;
 use taut_core::solve::{Ending, Event};
-use taut_export::fmu::{REFERENCES, Role};
+use taut_export::fmu::Role;
 
 /// Part of a step that a clock may be off by.
 const NEAR: f64 = 1e-9;
@@ -113,13 +113,11 @@ impl Instance {
         Ok(())
     }
 
-    /// The reference of each slide from its five inputs now.
+    /// The reference of each slide now.
     fn referred(&self, role: fn(usize) -> Role) -> Vec<Reference> {
-        let value = |k: usize| place(&self.model, role(k)).map_or(0.0, |place| self.inputs[place].at(self.time));
         let of_slide = |slide: usize| {
-            let [position, speed, acceleration, jerk, snap]: [f64; REFERENCES] =
-                std::array::from_fn(|k| value(slide * REFERENCES + k));
-            Reference { position, speed, acceleration, jerk, snap }
+            let (origin, reference) = self.reference(role, slide);
+            reference.after(self.time - origin)
         };
         (0..self.model.slides()).map(of_slide).collect()
     }

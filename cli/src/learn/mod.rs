@@ -11,7 +11,7 @@ use crate::interrupt::{Interrupt, interrupted};
 use crate::progress::Progress;
 use std::fmt::Write;
 use taut::Error;
-use taut::case::{Accepted, Files, Move};
+use taut::case::{Files, Move};
 use taut::json;
 use taut::learning::{At, Learned, Trial, learn};
 use taut::log::read_samples;
@@ -23,7 +23,7 @@ pub fn run(args: &Args) -> Outcome {
     // Without --map there is a log.
     let Some(log) = args.log.as_deref() else { return map::run(args) };
     let common = &args.common;
-    let case = common.accepting(&args.case, (Files::Nothing, Accepted::Motors))?;
+    let case = common.open_for(&args.case, Files::Nothing)?;
     let (design, moves) = case.moves_named(&args.case, &args.moves)?;
     let motion: &Move = match &moves[..] {
         [one] => one,

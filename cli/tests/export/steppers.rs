@@ -1,13 +1,17 @@
 //! Machines with steppers in C, drawn at random, against taut's own solver along the same held commands.
 
 use super::c::{compiled, run_here};
+use super::in_loop::in_loop;
 use super::machines::random;
-use super::tools::{are_there, doubles, python, run, taut, write_doubles};
+use super::tools::{are_there, doubles, file, python, run, taut, write_doubles};
 use std::fmt::Write;
 use std::fs;
 use taut::case::Case;
-use taut::mechanism::{Status, What};
-use taut::solve::{Ending, Solution, Solver, simulate};
+use taut::control::{Setup, Stepped, closed_loop};
+use taut::mechanism::{State, Status, What};
+use taut::signal::Signal;
+use taut::signal::profile::Reference;
+use taut::solve::{Ending, Simulator, Solution, Solver, simulate};
 use tempfile::TempDir;
 
 /// Steps of a command, of 1 ms each.
@@ -292,5 +296,114 @@ fn what_a_stepper_cannot_follow_is_a_status() {
         assert!(!output.status.success());
         let told = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(told.contains(word) && told.contains("next:"), "{told}");
+    }
+}
+
+/// A closed-loop stepper in C, its harness beside it, as far as `until`: the ways of all bodies after each of `per`
+/// steps of a sample, for references that are held over a step. `at` is the time within a step of the reference's value.
+fn looped_in_c(case: &Case, text: &str, (per, until, at): (usize, f64, f64)) -> (f64, Vec<Vec<f64>>) {
+    let (design, machine) = (case.controller.as_ref().unwrap(), &case.machine);
+    let step = design.every / per as f64;
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("case.toml"), text).unwrap();
+    let each = format!("{step:e} s");
+    let words = ["export", "c", "case.toml", "--part", "both", "--out", "model.c", "--step", &each];
+    let output = taut(folder.path(), &words);
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let steps = (until / step).round() as usize;
+    let rows = (0..steps).flat_map(|k| held_row(case, k as f64 * step, at * step));
+    write_doubles(&folder.path().join("in.bin"), rows);
+    fs::copy(file("cli/tests/export/looped.c"), folder.path().join("looped.c")).unwrap();
+    let counts = machine.encoder.map_or(0.0, |encoder| encoder.counts_per_unit(1.0));
+    let late = (design.delay / step).round() as usize;
+    let mut words: Vec<String> = ["-std=c99", "-O2", "-ffp-contract=off", "looped.c"].map(String::from).to_vec();
+    words.extend(["model.c", "model_left.c", "model_right.c"].map(String::from));
+    words.retain(|word| !word.starts_with("model") || folder.path().join(word).exists());
+    words.push(format!("-DRADIUS={:e}", machine.pulley_radius));
+    words.push(format!("-DCOUNTS={counts:e}"));
+    words.extend([format!("-DPER={per}"), format!("-DLATE={late}")]);
+    words.extend(["-lm", "-o", "here"].map(String::from));
+    run(folder.path(), "gcc", &words.iter().map(String::as_str).collect::<Vec<_>>());
+    run(folder.path(), folder.path().join("here"), &[]);
+    let bodies = machine.mechanism().bodies.len();
+    (step, doubles(&folder.path().join("out.bin")).chunks(bodies).map(<[f64]>::to_vec).collect())
+}
+
+/// References of the drives `at` a time after that of a step, and those of the slides at it with their derivatives.
+fn held_row(case: &Case, time: f64, at: f64) -> Vec<f64> {
+    let profiles = case.moves[0].references(case.controller.as_ref().unwrap());
+    let slides: Vec<_> = profiles.iter().map(|profile| profile.at(time)).collect();
+    let shares = case.machine.belt_shares();
+    let of_drive = |shares: &&[f64]| -> f64 {
+        shares.iter().zip(&profiles).map(|(share, profile)| share * profile.at(time + at).position).sum()
+    };
+    let fields = slides.iter().flat_map(|y| [y.position, y.speed, y.acceleration, y.jerk, y.snap]);
+    shares.iter().map(of_drive).chain(fields).collect()
+}
+
+/// The same loop by taut's simulator and its controllers stepped from outside.
+fn looped(case: &Case, (step, rows): (f64, usize)) -> Vec<Vec<f64>> {
+    let mechanism = case.machine.mechanism();
+    let solver = Solver::General { tolerance: 1e-11 };
+    let mut machine = Simulator::of_mechanism(&mechanism, &mechanism.begun(&State::default()), solver, step).unwrap();
+    let mut control = Stepped::new(case.controller.as_ref().unwrap(), &case.machine).unwrap();
+    let (bodies, drives) = (mechanism.bodies.len(), mechanism.drives.len());
+    let mut all = Vec::new();
+    for k in 0..rows {
+        let time = k as f64 * step;
+        let row = held_row(case, time, 0.0);
+        while control.next() <= time + 1e-3 * step {
+            let slides: Vec<Reference> = row[drives..]
+                .chunks(5)
+                .map(|y| Reference { position: y[0], speed: y[1], acceleration: y[2], jerk: y[3], snap: y[4] })
+                .collect();
+            control.decide(&machine.state(), &vec![0.0; drives], &slides, None);
+        }
+        for drive in 0..drives {
+            let value = row[drive] + control.commands()[drive];
+            let now = machine.time();
+            machine.set_input(drive, &Signal::Step { value, at: 0.0 }.piece(now)).unwrap();
+        }
+        machine.advance((k + 1) as f64 * step, &mut Vec::new()).unwrap();
+        all.push(machine.state().position[..bodies].to_vec());
+    }
+    all
+}
+
+/// The largest distance of ways, m at the belt.
+fn apart(case: &Case, a: &[f64], b: &[f64]) -> f64 {
+    let mechanism = case.machine.mechanism();
+    let levers = mechanism.bodies.iter().map(|body| body.kind.lever());
+    levers.zip(a.iter().zip(b)).map(|(lever, (a, b))| lever * (a - b).abs()).fold(0.0, f64::max)
+}
+
+/// Plant and controllers of closed-loop steppers in C had never been run together: along references that are held over
+/// two steps of a sample they go where taut's own simulator and controllers go, and with short steps where `taut move`
+/// goes, whose references are not held.
+#[test]
+fn loops_of_steppers_in_c_go_where_taut_has_them() {
+    if !are_there(&["gcc"]) {
+        return;
+    }
+    for seed in 0..8 {
+        let text = in_loop(seed, random(7000 + seed), false);
+        let case = Case::from_text("case.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
+        let (step, written) = looped_in_c(&case, &text, (2, 0.1, 0.0));
+        let own = looped(&case, (step, written.len()));
+        let off = written.iter().zip(&own).map(|(a, b)| apart(&case, a, b)).fold(0.0, f64::max);
+        println!("{seed}: {off:.1e} m of held references");
+        assert!(off < 1e-8, "{seed}: {off:e} m\n{text}");
+        // The reference of the middle of each step.
+        let (_, written) = looped_in_c(&case, &text, (64, 0.15, 0.5));
+        let (design, shown) = (case.controller.as_ref().unwrap(), &case.moves[0]);
+        let run = closed_loop(&Setup::new(&case.machine, design, &shown.profiles, shown.until)).unwrap();
+        let last = written.last().unwrap();
+        let ends = shown.references(design).into_iter().map(|profile| profile.at(shown.until).position);
+        for ((end, load), place) in ends.zip(&run.figures.loads).zip(&case.machine.mechanism().roles.loads) {
+            let off = end - load.error.last - last[*place];
+            println!("{seed}: {off:.1e} m of a move");
+            // A microstep that comes a step later lets an encoder count at another sample.
+            assert!(off.abs() < 1e-6, "{seed}: {off:e} m\n{text}");
+        }
     }
 }

@@ -171,7 +171,7 @@ impl Stepped {
         for (number, slide) in slides.iter().enumerate().take(SLIDES) {
             references[0][number] = *slide;
             references[1][number] =
-                ahead.and_then(|ahead| ahead.get(number).copied()).unwrap_or_else(|| after(slide, lead));
+                ahead.and_then(|ahead| ahead.get(number).copied()).unwrap_or_else(|| slide.after(lead));
         }
         let mut of_drives = Commands::default();
         of_drives.iter_mut().zip(currents).for_each(|(own, current)| *own = *current);
@@ -220,20 +220,5 @@ impl Stepped {
         memory.zip(numbers).for_each(|(number, saved)| *number = saved);
         (self.clocked.k, self.clocked.halfway) = (*k, halfway);
         Some(())
-    }
-}
-
-/// A reference `lead` later, s, with a constant highest derivative.
-fn after(reference: &Reference, lead: f64) -> Reference {
-    if lead == 0.0 {
-        return *reference;
-    }
-    let Reference { position, speed, acceleration, jerk, snap } = *reference;
-    Reference {
-        position: position + lead * (speed + lead * (acceleration / 2.0 + lead * (jerk / 6.0 + lead * snap / 24.0))),
-        speed: speed + lead * (acceleration + lead * (jerk / 2.0 + lead * snap / 6.0)),
-        acceleration: acceleration + lead * (jerk + lead * snap / 2.0),
-        jerk: jerk + lead * snap,
-        snap,
     }
 }

@@ -47,6 +47,21 @@ impl Reference {
     pub fn steady(speed: f64) -> Self {
         Self { speed, ..Self::default() }
     }
+
+    /// Σ y⁽ᵏ⁾ tᵏ/k!: the reference a time `t` later, s, with a constant snap.
+    pub fn after(&self, t: f64) -> Self {
+        if t == 0.0 {
+            return *self;
+        }
+        let Self { position, speed, acceleration, jerk, snap } = *self;
+        Self {
+            position: position + t * (speed + t * (acceleration / 2.0 + t * (jerk / 6.0 + t * snap / 24.0))),
+            speed: speed + t * (acceleration + t * (jerk / 2.0 + t * snap / 6.0)),
+            acceleration: acceleration + t * (jerk + t * snap / 2.0),
+            jerk: jerk + t * snap,
+            snap,
+        }
+    }
 }
 
 impl<N: Number> Reference<N> {

@@ -3,7 +3,7 @@
  *
  * Call @name@_control once every @NAME@_SAMPLE_TIME s. Its command, @unit@, is meant to act @NAME@_DELAY s after the
  * sample.
-@shaper@ */
+@remarks@ */
 #define @NAME@_SAMPLE_TIME @every@
 #define @NAME@_DELAY @delay@
 /* How far ahead of the sample `ahead` is looked up, s. */

@@ -6,7 +6,7 @@ use crate::design::Design;
 use crate::error::Result;
 use crate::machine::Machine;
 use crate::program::{Expr, Node, Operator, Program, Statement, Test, sign};
-use crate::{Real, shaper_remark};
+use crate::{Real, remarks};
 use std::fmt::Write;
 
 const HEADER: &str = include_str!("controller.h");
@@ -19,6 +19,8 @@ pub(super) struct Controller {
     unit: &'static str,
     /// Of a gantry, the slides whose references it takes.
     slides: Vec<&'static str>,
+    /// Lines of the comment at its function.
+    remarks: String,
 }
 
 impl Controller {
@@ -26,7 +28,8 @@ impl Controller {
     pub(super) fn new(design: &Design, machine: &Machine, drive: usize, real: Real) -> Result<Self> {
         let unit = machine.drives[drive].amplifier.mode.unit();
         let program = program(design, machine, drive, real.largest())?;
-        Ok(Self { design: design.clone(), program, unit, slides: slides(machine) })
+        let remarks = remarks(machine, design).iter().map(|line| format!(" * {line}\n")).collect();
+        Ok(Self { design: design.clone(), program, unit, slides: slides(machine), remarks })
     }
 
     pub(super) fn facts(&self) -> Vec<(String, String)> {
@@ -41,12 +44,11 @@ impl Controller {
     pub(super) fn header(&self, writer: &Writer) -> String {
         let fields = DERIVATIVES.map(|(name, unit)| format!("    @name@_real {name}; /* {unit} */"));
         let lead = self.design.feed_forward.lead.unwrap_or(self.design.delay + 0.5 * self.design.every);
-        let shaper: String = shaper_remark(&self.design).iter().map(|line| format!(" * {line}\n")).collect();
         let [arrays, whose] = match self.slides[..] {
             [] => [String::new(), "the cart".into()],
             _ => [self.arrays(), "a slide".into()],
         };
-        let text = HEADER.replace("@fields@", &fields.join("\n")).replace("@shaper@", &shaper);
+        let text = HEADER.replace("@fields@", &fields.join("\n")).replace("@remarks@", &self.remarks);
         let text = text.replace("@arrays@", &arrays).replace("@whose@", &whose);
         writer.fill(
             &text,

@@ -55,6 +55,7 @@ pub(super) fn named(case: &Case, part: Part, (stem, name): (&str, &str), options
             }
         }
         notes.extend(super::drives_note(case));
+        notes.extend(super::correction_note(&case.machine));
         notes.extend(super::shaper_note(design));
     }
     let own = (!source.is_empty()).then(|| whole(&writer, stem, &header, &source));

@@ -2,7 +2,9 @@
 
 use super::controller::program;
 use super::program::{Expr, Node, Program, Statement, Test, sign};
-use super::{Exported, Part, controller, drives_note, identifier, shaper_note, shaper_remark, without_controller};
+use super::{
+    Exported, Part, controller, correction_note, drives_note, identifier, remarks, shaper_note, without_controller,
+};
 use crate::case::Case;
 use crate::design::Design;
 use crate::error::{Error, Result};
@@ -41,6 +43,7 @@ pub(super) fn export(case: &Case, part: Option<Part>, stem: &str) -> Result<Expo
     let mut notes =
         vec!["untried on a real controller: its grammar is checked, and it is run by an interpreter".into()];
     notes.extend(drives_note(case));
+    notes.extend(correction_note(&case.machine));
     notes.extend(shaper_note(design));
     Ok(Exported { files: vec![(format!("{stem}.st"), texts.join("\n").into_bytes())], facts, notes })
 }
@@ -65,7 +68,7 @@ fn function_block(case: &Case, design: &Design, program: &Program, (name, unit):
     let mut text = BLOCK.to_string();
     for (place, part) in [
         ("@title@", plain(&case.title)),
-        ("@shaper@", shaper_remark(design).iter().map(|line| format!("(* {line} *)\n")).collect()),
+        ("@remarks@", remarks(&case.machine, design).iter().map(|line| format!("(* {line} *)\n")).collect()),
         ("@structure@", plain(design.structure.name())),
         ("@version@", env!("CARGO_PKG_VERSION").into()),
         ("@name@", name.into()),
