@@ -14,8 +14,8 @@ use taut::fit::{Estimate, Fit, Nuisance, Problem, check, fit, inverse_of_square,
 use taut::log::Quantity;
 use taut::parameter::{Free, values};
 use taut::plan::Experiment;
-use taut::signal::Signal;
 use taut::signal::profile::{Leg, Limits, Profile};
+use taut::signal::{Hold, Signal};
 use taut::solve::{Flow, Solver, simulate};
 use taut::trajectory::Trajectory;
 
@@ -509,9 +509,10 @@ fn a_delay_beside_a_current_is_fitted_from_parameters_that_are_off() {
         current.truncate(run.kept.len());
         let outputs = vec![output(Quantity::DriveAngle, angles), output(Quantity::MotorCurrent, current)];
         let log = columns(&motion.name, values(|sample| sample.time), values(|sample| sample.given), outputs);
-        let mut experiment = Experiment::new(&motion.name, vec![Signal::Step { value: 0.0, at: 0.0 }], 1.0, 1e-3);
-        (experiment.until, experiment.log) = (*log.time.last().unwrap(), Some(log));
-        experiments.push(experiment);
+        let until = *log.time.last().unwrap();
+        let input = Signal::Sampled { times: log.time.clone(), values: log.inputs[0].clone(), hold: Hold::Zero };
+        experiments
+            .push(Experiment { log: Some(log), ..Experiment::new(&motion.name, vec![input], until, design.every) });
     }
     case.experiments = experiments;
     let nuisance = Nuisances { delay: Scope::Shared, ..Nuisances::default() };

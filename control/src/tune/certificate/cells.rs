@@ -462,17 +462,16 @@ mod tests {
             other: 0.0,
         };
         let table = Table {
-            center: vec![1.0],
+            values: Columns { center: vec![1.0], columns: vec![vec![1.0]], nodes: 1 },
             deviation: vec![0.0],
             monic: vec![1.0],
             monic_deviation: vec![0.0],
             linear: Vec::new(),
-            terms: Vec::new(),
             mixed: vec![0.0],
-            nodes: vec![1.0],
             is_corner: vec![true],
         };
-        shown(&table, &form(3.0, 0.0), &form(3.0 * x, 3.0 * change), limit)
+        let seen = |form| Seen::new(form, &table.values);
+        shown(&table, &seen(form(3.0, 0.0)), &seen(form(3.0 * x, 3.0 * change)), limit)
     }
 
     #[test]

@@ -11,9 +11,9 @@ use crate::fit::asked::problem::{Problem, Stop, extent};
 use crate::fit::asked::residuals::Residuals;
 use crate::fit::asked::run::{FittedLog, MeasuredOutput};
 use crate::fit::limits::{
-    FILE_ROUNDING, FIRST_BEGINNING, HUBER, LEAST_ROWS, MORE_THAN_NOISE, MOST_START_WINDOWS, ROUGH_TOLERANCE,
-    SAME_MINIMUM, SHORTEST_BEGINNING, START_WINDOWS, STEPS, STEPS_IN_PART, SWINGS_KEEP, TRIAL_ITERATIONS,
-    WEIGHT_ROUNDS,
+    FAR_BEYOND_NOISE, FILE_ROUNDING, FIRST_BEGINNING, HUBER, LEAST_ROWS, MORE_THAN_NOISE, MOST_START_WINDOWS,
+    ROUGH_TOLERANCE, SAME_MINIMUM, SHORTEST_BEGINNING, START_WINDOWS, STEPS, STEPS_IN_PART, SWINGS_KEEP,
+    TRIAL_ITERATIONS, WEIGHT_ROUNDS,
 };
 use crate::log::Quantity;
 use crate::number::engineering;
@@ -111,12 +111,18 @@ pub(crate) fn search_as_far<'a>(
         work.evaluations += minimum.evaluations;
         minimum
     };
-    let start = match effort.is_short && !problem.machine.has_torque_balance() {
+    let (start, other) = match effort.is_short && !problem.machine.has_torque_balance() {
         // It begins at the result for all logs.
-        true => problem.start(),
+        true => (problem.start(), None),
         false => first_guess(case, plan, &mut problem, &mut descend)?,
     };
     let mut best = descend(&mut problem, &start, &whole);
+    if let Some(other) = other.filter(|_| times_noise(&problem, &best) > FAR_BEYOND_NOISE) {
+        let trial = descend(&mut problem, &other, &whole);
+        if trial.ending != Ending::Failed && trial.cost < best.cost {
+            best = trial;
+        }
+    }
     if best.ending == Ending::Failed {
         let outrun = |run: &FittedLog| Some((run.name.clone(), run.outrun(&problem.machine)?));
         if let Some((name, [speed, most])) = problem.runs.iter().find_map(outrun) {
@@ -281,8 +287,14 @@ fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
 type Descend<'d> = dyn FnMut(&mut Problem, &[f64], &Options) -> Minimum + 'd;
 
 /// Start values of the case or of a regression, with delays after fits that hold them; for a stepper, of fits to the
-/// beginnings of its logs; for several coordinates, of fits in short windows: whichever fits the logs better.
-fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut Descend) -> Result<Vec<f64>> {
+/// beginnings of its logs; for several coordinates, of fits in short windows: whichever fits the logs better. Beside
+/// those with delays, the start without them.
+fn first_guess(
+    case: &Case,
+    plan: &Plan,
+    problem: &mut Problem,
+    descend: &mut Descend,
+) -> Result<(Vec<f64>, Option<Vec<f64>>)> {
     let start = problem.start();
     let guess = match &problem.machine {
         machine if machine.has_torque_balance() => by_regression(problem, &start),
@@ -291,8 +303,8 @@ fn first_guess(case: &Case, plan: &Plan, problem: &mut Problem, descend: &mut De
     };
     let guess = ranked(problem, [start].into_iter().chain(guess)).swap_remove(0);
     match problem.machine.has_torque_balance() && plan.nuisance.delay != Scope::Off {
-        true => with_delays(case, plan, problem, guess, descend),
-        false => Ok(guess),
+        true => Ok((with_delays(case, plan, problem, guess.clone(), descend)?, Some(guess))),
+        false => Ok((guess, None)),
     }
 }
 
