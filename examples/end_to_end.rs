@@ -43,7 +43,10 @@ fn main() -> std::process::ExitCode {
             "--machines" => number().map(|value| machines = value as u64),
             "--seed" => number().map(|value| seed = value as u64),
             "--effort" => number().map(|value| effort = value),
-            _ => Some(path = PathBuf::from(&arg)),
+            _ => {
+                path = PathBuf::from(&arg);
+                continue;
+            }
         };
         if read.is_none() {
             eprintln!("{arg} needs a number");

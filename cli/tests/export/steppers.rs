@@ -359,9 +359,8 @@ fn looped(case: &Case, (step, rows): (f64, usize)) -> Vec<Vec<f64>> {
                 .collect();
             control.decide(&machine.state(), &vec![0.0; drives], &slides, None);
         }
-        for drive in 0..drives {
-            let value = row[drive] + control.commands()[drive];
-            let now = machine.time();
+        for (drive, (own, correction)) in row.iter().zip(control.commands()).enumerate() {
+            let (value, now) = (own + correction, machine.time());
             machine.set_input(drive, &Signal::Step { value, at: 0.0 }.piece(now)).unwrap();
         }
         machine.advance((k + 1) as f64 * step, &mut Vec::new()).unwrap();
