@@ -33,10 +33,13 @@ pub fn comparison(tried: &[Tried]) -> String {
     }
     let spread = tried.iter().flat_map(|tried| &tried.done).any(|done| done.worst.is_some());
     let amperes = tried.iter().any(|tried| tried.case.machine.drives[0].amplifier.mode == AmplifierMode::Current);
+    let paths = tried.iter().flat_map(|tried| &tried.done).any(|done| done.run.figures.contour.is_some());
     let mut text = String::new();
     for name in names {
         let _ = writeln!(text, "{}", bold(name));
-        let mut headings = vec!["controller", "cart", "rms", "following", "settles", "overshoot", "current"];
+        let mut headings = vec!["controller", "cart", "rms"];
+        headings.extend(if paths { ["contour", "rms", "settles"] } else { ["following", "settles", "overshoot"] });
+        headings.push("current");
         if !amperes {
             headings.push("voltage");
         }
@@ -51,11 +54,17 @@ pub fn comparison(tried: &[Tried]) -> String {
                 case.case.title.clone(),
                 length(figures.cart().error.peak.value.abs()),
                 length(figures.cart().error.rms),
-                length(figures.drive().following.peak.value.abs()),
-                figures.settling.map_or("no".into(), |s| format!("{:.0} ms", 1e3 * s)),
-                length(figures.cart().overshoot),
-                format!("{:.2} A", figures.drive().current.1),
             ];
+            let settles = figures.settling.map_or("no".into(), |s| format!("{:.0} ms", 1e3 * s));
+            row.extend(match figures.contour {
+                Some(contour) => [length(contour.peak.value.abs()), length(contour.rms), settles],
+                None if paths => ["–".into(), "–".into(), settles],
+                None => {
+                    let following = length(figures.drive().following.peak.value.abs());
+                    [following, settles, length(figures.cart().overshoot)]
+                }
+            });
+            row.push(format!("{:.2} A", figures.drive().current.1));
             if !amperes {
                 row.push(format!("{:.2} V", figures.drive().voltage.1));
             }
@@ -77,9 +86,8 @@ pub fn comparison(tried: &[Tried]) -> String {
         }
         text.push('\n');
     }
-    text.push_str(
-        "cart, rms: y − x; following: y − r φ₁, at most; settles: after the end of the profile; current, voltage: rms",
-    );
+    let second = if paths { "contour, rms: distance from the path" } else { "following: y − r φ₁, at most" };
+    let _ = write!(text, "cart, rms: y − x; {second}; settles: after the end of the profile; current, voltage: rms");
     text.push_str(if spread {
         "\noff: with each parameter of the axis off, one at a time: largest |y − x|, and how many settle\n"
     } else {
