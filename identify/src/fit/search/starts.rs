@@ -301,23 +301,23 @@ fn first_guess(
         machine if machine.stepper().is_some() => Some(by_beginnings(case, plan, problem, &start, descend)?),
         _ => in_windows(case, plan, problem, &start, descend)?,
     };
-    let guess = ranked(problem, [start].into_iter().chain(guess)).swap_remove(0);
+    let guess = match guess {
+        Some(guess) => better(problem, start, guess),
+        None => start,
+    };
     match problem.machine.has_torque_balance() && plan.nuisance.delay != Scope::Off {
         true => Ok((with_delays(case, plan, problem, guess.clone(), descend)?, Some(guess))),
         false => Ok((guess, None)),
     }
 }
 
-/// Points in the order of their costs; of equal ones the first comes first.
-fn ranked(problem: &mut Problem, points: impl IntoIterator<Item = Vec<f64>>) -> Vec<Vec<f64>> {
+/// The guess, if it fits the logs better than the start, otherwise that.
+fn better(problem: &mut Problem, start: Vec<f64>, guess: Vec<f64>) -> Vec<f64> {
     let mut residuals = vec![0.0; problem.rows()];
-    let mut cost = |x: Vec<f64>| match problem.evaluate(&x, &mut residuals) {
-        true => (residuals.iter().map(|r| r * r).sum::<f64>(), x),
-        false => (f64::INFINITY, x),
+    let mut cost = |x: &[f64]| {
+        if problem.evaluate(x, &mut residuals) { residuals.iter().map(|r| r * r).sum() } else { f64::INFINITY }
     };
-    let mut ranked: Vec<_> = points.into_iter().map(&mut cost).collect();
-    ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-    ranked.into_iter().map(|(_, x)| x).collect()
+    if cost(&guess) < cost(&start) { guess } else { start }
 }
 
 /// Start with delays: parameters are fitted with all inputs late, or early, by half an interval between samples, then by
