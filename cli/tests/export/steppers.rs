@@ -128,7 +128,7 @@ fn drawn_machines_go_where_taut_has_them() {
         return;
     }
     let (mut lost_any, mut kept_all) = (0, 0);
-    for seed in 0..8 {
+    for seed in 0..16 {
         let drawn = drawn(500 + seed);
         let (case, solution) = solved(&drawn);
         let mechanism = case.machine.mechanism();
@@ -185,7 +185,7 @@ fn drawn_machines_go_where_taut_has_them() {
             lost_any += 1;
         }
     }
-    assert!(lost_any > 0 && kept_all > 2, "{lost_any} lost steps, {kept_all} did not");
+    assert!(lost_any > 0 && kept_all > 4, "{lost_any} lost steps, {kept_all} did not");
 }
 
 /// Each position of every body after each step, in m at the belt, by taut's own solver.
@@ -258,7 +258,7 @@ fn drawn_machines_go_in_python_and_octave_where_taut_has_them() {
             compare("python", &folder, &told);
         }
         // Octave takes a minute for some of them.
-        if has_octave && seed == 0 {
+        if has_octave && seed % 2 == 0 {
             let folder = exported_to(&drawn, "matlab", "axis.m");
             fs::write(folder.path().join("check.m"), IN_OCTAVE).unwrap();
             let told = run(folder.path(), "octave-cli", &["--no-init-file", "--quiet", "check.m"]);
@@ -300,7 +300,8 @@ fn what_a_stepper_cannot_follow_is_a_status() {
 }
 
 /// A closed-loop stepper in C, its harness beside it, as far as `until`: the ways of all bodies after each of `per`
-/// steps of a sample, for references that are held over a step. `at` is the time within a step of the reference's value.
+/// steps of a sample, for references that are held over a step. `at` is the time within a step of the reference's
+/// value.
 fn looped_in_c(case: &Case, text: &str, (per, until, at): (usize, f64, f64)) -> (f64, Vec<Vec<f64>>) {
     let (design, machine) = (case.controller.as_ref().unwrap(), &case.machine);
     let step = design.every / per as f64;
