@@ -38,7 +38,7 @@ pub struct Problem<'a> {
     /// True if residuals swing to and fro, so that a first value is as far off as any other, however smooth they are.
     pub swings: bool,
     /// True if curves of friction are simulated as straight lines.
-    is_straight: bool,
+    pub(crate) is_straight: bool,
     units: Vec<Scale>,
     /// Called between evaluations; true ends the search.
     stop: Option<Stop<'a>>,

@@ -446,7 +446,7 @@ impl FittedLog {
     pub(crate) fn delay_inputs(&mut self, by: f64) {
         for input in &mut self.inputs {
             if let Signal::Sampled { times, .. } = input {
-                *times = times.iter().map(|time| time + by).collect();
+                times.iter_mut().for_each(|time| *time += by);
             }
         }
     }

@@ -320,8 +320,8 @@ fn better(problem: &mut Problem, start: Vec<f64>, guess: Vec<f64>) -> Vec<f64> {
     if cost(&guess) < cost(&start) { guess } else { start }
 }
 
-/// Start with delays: parameters are fitted with all inputs late, or early, by half an interval between samples, then by
-/// one and a half and so on, as long as that fits the logs better.
+/// Start with delays: parameters are fitted with all inputs late, or early, by half an interval between samples, then
+/// by one and a half and so on, as long as that fits the logs better.
 ///
 /// Inputs are held between samples, so that the current of a motor without inductance jumps, and with it the cost
 /// wherever a delay passes a whole interval. A search of all together that began with wrong parameters ended there.
@@ -333,20 +333,19 @@ fn with_delays(
     descend: &mut Descend,
 ) -> Result<Vec<f64>> {
     let undelayed = Plan { nuisance: Nuisances { delay: Scope::Off, ..plan.nuisance }, ..plan.clone() };
+    let undelayed = Problem::new(case, &undelayed)?.stopped_by(problem.stop()).straight(problem.is_straight);
     let interval = problem.runs[0].interval();
-    let mut fitted = |intervals: f64, problem: &mut Problem, from: &[f64]| -> Result<Option<(f64, f64, Vec<f64>)>> {
-        let mut other = Problem::new(case, &undelayed)?.stopped_by(problem.stop());
+    let mut fitted = |intervals: f64, problem: &mut Problem, from: &[f64]| {
+        let (mut other, mut x) = (undelayed.clone(), from.to_vec());
         other.runs.iter_mut().for_each(|run| run.delay_inputs(intervals * interval));
-        let mut x = from.to_vec();
-        let cost = improve(other, problem, &mut x, descend);
-        Ok(cost.map(|cost| (cost, intervals, x)))
+        improve(other, problem, &mut x, descend).map(|cost| (cost, intervals, x))
     };
-    let [late, early] = [fitted(0.5, problem, &start)?, fitted(-0.5, problem, &start)?];
-    let first = late.into_iter().chain(early).min_by(|a, b| a.0.total_cmp(&b.0));
+    let both = [0.5, -0.5].map(|intervals| fitted(intervals, problem, &start));
+    let first = both.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
     let Some(mut best) = first else { return Ok(start) };
     let further = best.1.signum();
     while !problem.is_stopped() {
-        match fitted(best.1 + further, problem, &best.2)? {
+        match fitted(best.1 + further, problem, &best.2) {
             Some(next) if next.0 < best.0 => best = next,
             _ => break,
         }
