@@ -2,26 +2,35 @@
 //! work on the true numbers.
 //!
 //! `cargo xtask end-to-end [--machines N] [--seed S] [--effort E] [CASE]` prints a table. Each machine is the case with
-//! cart mass, friction and winding resistance off by a factor from a half to two. The loop of the case follows its moves
-//! on that machine; the controller's samples (encoder counts, command, noisy current) are fitted by the case as it is.
-//! The controller is tuned and the moves are planned once on the fitted case and once on the true one, and both run on
-//! the machine.
+//! cart mass, friction and winding resistance off by a factor from a half to two. The loop of the case follows its
+//! moves on that machine; the controller's samples (encoder counts, command, noisy current) are fitted by the case as
+//! it is. The controller is tuned and the moves are planned once on the fitted case and once on the true one, and both
+//! run on the machine.
 
+// Each of them is used in part.
+#[allow(dead_code)]
+#[path = "../tests/common"]
+mod common {
+    pub mod drawn;
+    pub mod logged;
+}
+
+use common::drawn::off_by_two;
+use common::logged::of_loop;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
-use taut::case::{Case, Files, Move, Tuning};
-use taut::chance::{normal, uniform};
-use taut::control::{Loop, MoveRun, Rows, Setup, Standard, closed_loop, each, stream};
+use taut::case::{Case, Files, Move, Nuisances, Plan, Scope, Tuning};
+use taut::chance::normal;
+use taut::control::{MoveRun, Setup, closed_loop};
 use taut::error::{Error, Result};
 use taut::fit::fit;
 use taut::machine::Machine;
 use taut::planning::plan;
 use taut::reach::quickest::Wanted;
 use taut::signal::profile::Profile;
-use taut::solve::{Flow, Solver};
-use taut::trajectory::Trajectory;
+use taut::solve::Flow;
 use taut::tune::tune;
 
 /// The numbers that are hidden, and fitted.
@@ -97,73 +106,27 @@ impl Row {
 fn machine(path: &Path, number: u64, effort: f64) -> Result<Row> {
     let base = Case::read(path)?;
     let mut random = Pcg64::seed_from_u64(number);
-    let changes: Vec<String> = HIDDEN
-        .iter()
-        .filter_map(|key| {
-            let factor = 2f64.powf(2.0 * uniform(&mut random) - 1.0);
-            Some(format!("{key}={}", factor * taut::parameter::value(&base.machine, key)?))
-        })
-        .collect();
+    let changes = off_by_two(&base, &HIDDEN, &mut random);
     let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
     let truth = Case::read_with(path, &changes)?;
-    let folder = std::env::temp_dir().join(format!("taut-end-to-end-{}-{number}", std::process::id()));
-    std::fs::create_dir_all(&folder).map_err(|error| Error::new(format!("{}: {error}", folder.display())))?;
-    let row = fitted(&base, &truth.machine, &folder, &mut random).and_then(|fitted| {
-        // With the uncertainty of what was fitted, and of all else, as there.
-        let known = Case::from_text_for(Path::new("case.toml"), &fitted.text, &changes, Files::Nothing)?;
-        let [fitted, known] = [worked(&fitted, &truth.machine, effort)?, worked(&known, &truth.machine, effort)?];
-        Ok(Row { error: [fitted.0, known.0], arrival: [fitted.1, known.1] })
-    });
-    let _ = std::fs::remove_dir_all(&folder);
-    row
+    let fitted = fitted(&base, &truth.machine, path, &mut random)?;
+    // With the uncertainty of what was fitted, and of all else, as there.
+    let known = Case::from_text_for(path, &fitted.text, &changes, Files::Nothing)?;
+    let [fitted, known] = [worked(&fitted, &truth.machine, effort)?, worked(&known, &truth.machine, effort)?];
+    Ok(Row { error: [fitted.0, known.0], arrival: [fitted.1, known.1] })
 }
 
 /// The case with the numbers that its own loop's logs on the machine give.
-fn fitted(base: &Case, machine: &Machine, folder: &Path, random: &mut Pcg64) -> Result<Case> {
-    let mut text = base.text.clone();
-    for (k, motion) in base.moves.iter().enumerate() {
-        let name = format!("log {k}");
-        let file = folder.join(format!("{k}.csv"));
-        std::fs::write(&file, log(base, motion, machine, random)?)
-            .map_err(|error| Error::new(format!("{}: {error}", file.display())))?;
-        let _ = write!(
-            text,
-            "\n[[experiment]]\nname = \"{name}\"\nlog = {{ file = {:?}, time = \"time_s\", input = \"given\", \
-             drive_angle = \"measured\", motor_current = \"current\", scale = {{ drive_angle = {:?} }} }}\n",
-            file.display().to_string(),
-            1.0 / machine.pulley_radius
-        );
-    }
-    let free: Vec<String> = HIDDEN.iter().map(|key| format!("{key:?}")).collect();
-    let _ = write!(text, "\n[fit]\nfree = [{}]\nnuisance = {{ delay = \"shared\" }}\n", free.join(", "));
-    let name = folder.join("case.toml");
-    let case = Case::from_text(&name, &text)?;
-    let found = fit(&case, &case.fit_plan(&name)?, None, &mut |_| Flow::Continue)?;
+fn fitted(base: &Case, machine: &Machine, path: &Path, random: &mut Pcg64) -> Result<Case> {
+    let logs = base.moves.iter().map(|motion| of_loop(base, motion, machine, || NOISE * normal(random)));
+    let case = Case { experiments: logs.collect::<Result<_>>()?, ..base.clone() };
+    let free = HIDDEN.map(String::from).to_vec();
+    let nuisance = Nuisances { delay: Scope::Shared, ..Nuisances::default() };
+    let found = fit(&case, &Plan { free, nuisance, ..Plan::default() }, None, &mut |_| Flow::Continue)?;
     for warning in found.warnings() {
         eprintln!("{warning:?}");
     }
-    Case::from_text(&name, &found.case_text(&case, &name)?)
-}
-
-/// The controller's samples of a move on the machine, with the motor's current, as CSV.
-fn log(case: &Case, motion: &Move, machine: &Machine, random: &mut Pcg64) -> Result<String> {
-    let design = case.controller.as_ref().ok_or_else(|| Error::new("the case has no controller"))?;
-    let profiles = motion.references(design);
-    let rows = Rows { until: motion.until, every: design.every, window: motion.window };
-    let mut controllers = Standard::of_drives(design, &case.machine)?;
-    let mut current = Vec::new();
-    let mut take = |block: &Trajectory| {
-        current.extend_from_slice(block.get("motor_current").unwrap_or(&[]));
-        Flow::Continue
-    };
-    let (timing, solver) = (Loop::new(design), Solver::for_machine(machine));
-    let run = stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, true, &mut take)?;
-    let mut text = String::from("time_s,given,measured,current\n");
-    for (sample, current) in run.kept.iter().zip(current) {
-        let current = current + NOISE * normal(random);
-        let _ = writeln!(text, "{},{},{},{current}", sample.time, sample.given, sample.measured);
-    }
-    Ok(text)
+    Case::from_text_for(path, &found.case_text(base, path)?, &[], Files::Nothing)
 }
 
 /// Tunes the controller of a case and plans its moves; both run on the machine. Returns the largest cart error along
@@ -176,9 +139,7 @@ fn worked(case: &Case, machine: &Machine, effort: f64) -> Result<(f64, Option<f6
     let case = read(tuned.case_text(case, name)?)?;
     let mut error = 0_f64;
     for motion in &case.moves {
-        let own = ran(&case, motion, machine)?.figures.cart().error.peak.value.abs();
-        eprintln!("{} {:.2}", motion.name, 1e6 * own);
-        error = error.max(own);
+        error = error.max(ran(&case, motion, machine)?.figures.cart().error.peak.value.abs());
     }
     let wanted = Wanted { speed: None, acceleration: None, jerk: None, reserve: 0.1 };
     let plans = plan(&case, &[0], &wanted, &|| false)?;

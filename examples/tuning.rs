@@ -5,14 +5,17 @@
 //! [--only-drawn] stages/sollmann-jouaneh/controllers/*.toml
 //!
 //! `--effort E` also tunes with E times the budget, and `--evolution T` compares with a differential evolution of T
-//! times the budget: J, by how much the tuning is worse (better, below zero), and processor time. `--drawn N` also tunes
-//! N machines that are drawn about the first case named, from this seed on: mass, friction, pulleys' inertia and motor
-//! off by up to a factor of two. `--only-drawn` leaves out the cases themselves.
+//! times the budget: J, by how much the tuning is worse (better, below zero), and processor time. `--drawn N` also
+//! tunes N machines that are drawn about the first case named, from this seed on: mass, friction, pulleys' inertia and
+//! motor off by up to a factor of two. `--only-drawn` leaves out the cases themselves.
 
+#[path = "../tests/common/drawn.rs"]
+mod drawn;
+
+use drawn::off_by_two;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 use taut::case::{Case, Tuning};
-use taut::chance::uniform;
 use taut::tune::{Judgement, Tuned, Verdict, evolved, tune};
 
 /// The quantities that are drawn, as factors of the case's own.
@@ -70,14 +73,7 @@ fn main() {
 /// A machine that is drawn: what the first case has, each number times a factor from a half to two.
 fn machine(path: &str, seed: u64) -> taut::Result<Case> {
     let base = Case::read(path)?;
-    let mut random = Pcg64::seed_from_u64(seed);
-    let mut changes = Vec::new();
-    for key in DRAWN {
-        let factor = 2f64.powf(2.0 * uniform(&mut random) - 1.0);
-        if let Some(value) = taut::parameter::value(&base.machine, key) {
-            changes.push(format!("{key}={}", factor * value));
-        }
-    }
+    let changes = off_by_two(&base, &DRAWN, &mut Pcg64::seed_from_u64(seed));
     let changes: Vec<&str> = changes.iter().map(String::as_str).collect();
     Case::read_with(path, &changes)
 }
@@ -115,8 +111,8 @@ fn one(name: &str, case: taut::Result<Case>, beside: Beside) {
     println!("{}", told.unwrap_or_else(|error| format!("| {name} | – | | | | | {} | |", error.what)));
 }
 
-/// Cost that another search found, by how much the tuning is worse (better, below zero), and its processor time; whether
-/// a figure of what it found is worse than before, where one of the tuning's is.
+/// Cost that another search found, by how much the tuning is worse (better, below zero), and its processor time;
+/// whether a figure of what it found is worse than before, where one of the tuning's is.
 fn compared(tuned: &Tuned, other: Option<(&Verdict, Judgement)>, took: f64) -> String {
     let Some((verdict, judgement)) = other else { return format!(" none ({took:.1} s) |") };
     let worse = 100.0 * ((tuned.after.objective - verdict.objective).exp() - 1.0);

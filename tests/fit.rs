@@ -3,19 +3,17 @@
 use crate::common::chance;
 use crate::common::logged;
 use chance::Chance;
-use logged::{columns, logged, output};
+use logged::{logged, of_loop};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use taut::case::{Case, Nuisances, Plan, Scope, TEMPLATE};
-use taut::control::{Controller, Loop, Rows, Sample, Standard, stream};
+use taut::control::{Loop, Rows, Standard, stream};
 use taut::design;
 use taut::fit::least_squares::{Bounds, Differences, Ending, Options, Residuals, minimise};
 use taut::fit::{Estimate, Fit, Nuisance, Problem, check, fit, inverse_of_square, profiles};
-use taut::log::Quantity;
 use taut::parameter::{Free, values};
-use taut::plan::Experiment;
+use taut::signal::Signal;
 use taut::signal::profile::{Leg, Limits, Profile};
-use taut::signal::{Hold, Signal};
 use taut::solve::{Flow, Solver, simulate};
 use taut::trajectory::Trajectory;
 
@@ -490,31 +488,9 @@ fn a_delay_beside_a_current_is_fitted_from_parameters_that_are_off() {
     let changes = truth.map(|(key, value)| format!("{key}={value}"));
     let real = Case::read_with(path, &changes.each_ref().map(String::as_str)).unwrap();
     let mut case = Case::read(path).unwrap();
-    let design = case.controller.clone().unwrap();
     let mut chance = Chance::new(12);
-    let mut experiments = Vec::new();
-    for motion in &case.moves[..2] {
-        let (profiles, timing) = (motion.references(&design), Loop::new(&design));
-        let rows = Rows { until: motion.until, every: design.every, window: motion.window };
-        let mut controller = Standard::new(&design, &case.machine).unwrap();
-        let mut current = Vec::new();
-        let mut take = |block: &Trajectory| {
-            current.extend(block.get("motor_current").unwrap().iter().map(|i| i + 0.02 * chance.normal()));
-            Flow::Continue
-        };
-        let each: &mut [&mut dyn Controller] = &mut [&mut controller];
-        let run = stream(&real.machine, each, &timing, &profiles, &rows, Solver::Exact, true, &mut take).unwrap();
-        let values = |of: fn(&Sample) -> f64| run.kept.iter().map(of).collect::<Vec<f64>>();
-        let angles = values(|sample| sample.measured).iter().map(|x| x / real.machine.pulley_radius).collect();
-        current.truncate(run.kept.len());
-        let outputs = vec![output(Quantity::DriveAngle, angles), output(Quantity::MotorCurrent, current)];
-        let log = columns(&motion.name, values(|sample| sample.time), values(|sample| sample.given), outputs);
-        let until = *log.time.last().unwrap();
-        let input = Signal::Sampled { times: log.time.clone(), values: log.inputs[0].clone(), hold: Hold::Zero };
-        experiments
-            .push(Experiment { log: Some(log), ..Experiment::new(&motion.name, vec![input], until, design.every) });
-    }
-    case.experiments = experiments;
+    let logs = case.moves[..2].iter().map(|motion| of_loop(&case, motion, &real.machine, || 0.02 * chance.normal()));
+    case.experiments = logs.collect::<Result<_, _>>().unwrap();
     let nuisance = Nuisances { delay: Scope::Shared, ..Nuisances::default() };
     let plan = Plan { nuisance, ..plan(&truth.map(|(key, _)| key)) };
     let found = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();

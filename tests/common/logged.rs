@@ -1,8 +1,14 @@
 //! Runs as logs.
 
 use std::sync::Arc;
+use taut::case::{Case, Move};
+use taut::control::{Loop, Rows, Sample, Standard, each, stream};
+use taut::error::{Error, Result};
 use taut::log::{Log, Output, Quantity};
-use taut::signal::Hold;
+use taut::machine::Machine;
+use taut::plan::Experiment;
+use taut::signal::{Hold, Signal};
+use taut::solve::{Flow, Solver};
 use taut::trajectory::Trajectory;
 
 /// A log of these columns.
@@ -31,4 +37,28 @@ pub fn logged(name: &str, run: &Trajectory, drive_angle: Vec<f64>) -> Arc<Log> {
     let mut log = columns(name, column("time"), column("voltage"), vec![output(Quantity::DriveAngle, drive_angle)]);
     Arc::make_mut(&mut log).reference = run.get("reference").map(<[f64]>::to_vec);
     log
+}
+
+/// The samples of a case's controller in a move on this machine, as an experiment with a log: command, angle by the
+/// encoder, and the motor's current, to each value of which `noise` is added, A.
+pub fn of_loop(case: &Case, motion: &Move, machine: &Machine, mut noise: impl FnMut() -> f64) -> Result<Experiment> {
+    let design = case.controller.as_ref().ok_or_else(|| Error::new("the case has no controller"))?;
+    let (profiles, timing) = (motion.references(design), Loop::new(design));
+    let rows = Rows { until: motion.until, every: design.every, window: motion.window };
+    let mut controllers = Standard::of_drives(design, &case.machine)?;
+    let mut current = Vec::new();
+    let mut take = |block: &Trajectory| {
+        current.extend_from_slice(block.get("motor_current").unwrap_or(&[]));
+        Flow::Continue
+    };
+    let solver = Solver::for_machine(machine);
+    let run = stream(machine, &mut each(&mut controllers), &timing, &profiles, &rows, solver, true, &mut take)?;
+    let values = |of: fn(&Sample) -> f64| run.kept.iter().map(of).collect::<Vec<f64>>();
+    let angles = values(|sample| sample.measured).iter().map(|x| x / machine.pulley_radius).collect();
+    let currents = current.iter().take(run.kept.len()).map(|i| i + noise()).collect();
+    let outputs = vec![output(Quantity::DriveAngle, angles), output(Quantity::MotorCurrent, currents)];
+    let log = columns(&motion.name, values(|sample| sample.time), values(|sample| sample.given), outputs);
+    let until = log.time.last().copied().unwrap_or(motion.until);
+    let input = Signal::Sampled { times: log.time.clone(), values: log.inputs[0].clone(), hold: Hold::Zero };
+    Ok(Experiment { log: Some(log), ..Experiment::new(&motion.name, vec![input], until, design.every) })
 }

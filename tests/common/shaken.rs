@@ -146,8 +146,8 @@ impl Counts {
     }
 }
 
-/// Draws a machine, shakes both of its belts, and counts what `taut shape --belts` states. The ratio is from 0.7 to 1.4,
-/// or 1.
+/// Draws a machine, shakes both of its belts, and counts what `taut shape --belts` states. The ratio is from 0.7 to
+/// 1.4, or 1.
 pub fn judged(seed: u64, disturbed: Disturbed, is_equal: bool) -> Counts {
     let mut chance = Chance::new(seed);
     let ratio = if is_equal { 1.0 } else { chance.scaled(0.7, 1.4) };
