@@ -59,8 +59,8 @@
 //!
 //! # Later versions
 //!
-//! Results, and enumerations that will get further variants, are `#[non_exhaustive]`: further fields and variants do not
-//! break a program that reads them. What a program makes itself has a constructor for its necessary values, such as
+//! Results, and enumerations that will get further variants, are `#[non_exhaustive]`: further fields and variants do
+//! not break a program that reads them. What a program makes itself has a constructor for its necessary values, such as
 //! [`Machine::axis`](machine::Machine::axis), [`Motor::brushed`](machine::Motor::brushed),
 //! [`Experiment::new`](plan::Experiment::new), [`Design::new`](design::Design::new) and
 //! [`Setup::new`](control::Setup::new), or a `Default`; further fields can be set by `..`, and a version may add some:

@@ -332,8 +332,8 @@ fn noise_that_swings_is_known_as_such() {
     assert!(inside >= 18, "{inside} of 24: {ratios:?}");
 }
 
-/// Of a pure tone, hum of the mains or imbalance, the search of narrow-band noise saw a part: intervals of a right model
-/// did not hold beside it.
+/// Of a pure tone, hum of the mains or imbalance, the search of narrow-band noise saw a part: intervals of a right
+/// model did not hold beside it.
 #[test]
 fn intervals_hold_beside_a_tone() {
     for hertz in [17.3, 50.0] {

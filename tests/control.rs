@@ -251,8 +251,8 @@ fn a_riccati_equation_without_a_solution_says_so() {
 }
 
 /// Pulleys and spans alike on both sides, without damping: the pulleys vibrate against each other, and the cart, which
-/// alone is weighted, stands still. Rounding decides whether the regulator's equation can be solved then. The error spoke
-/// of a state that is to be given a weight, and there is none for it.
+/// alone is weighted, stands still. Rounding decides whether the regulator's equation can be solved then. The error
+/// spoke of a state that is to be given a weight, and there is none for it.
 #[test]
 fn a_vibration_without_the_cart_is_named_with_its_frequency() {
     let built = |mass: f64, second: f64, damping: f64, friction: f64| {

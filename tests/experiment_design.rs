@@ -56,7 +56,8 @@ fn promises_for_an_encoder_alone_are_kept() {
     }
 }
 
-/// Fits of an elastic belt end in minima beside the truth: the errors were 600 times those of an exact model, in silence.
+/// Fits of an elastic belt end in minima beside the truth: the errors were 600 times those of an exact model, in
+/// silence.
 #[test]
 fn a_promise_that_fits_do_not_keep_is_reported() {
     let case = template();

@@ -134,7 +134,8 @@ fn a_hidden_force_is_found() {
     assert!(inside as f64 >= 0.9 * all as f64, "{inside} of {all}");
 }
 
-/// Where the passes differ at the period of the largest sine, its side lobes were less probable, and named in its place.
+/// Where the passes differ at the period of the largest sine, its side lobes were less probable, and named in its
+/// place.
 #[test]
 fn the_largest_sine_is_named_first() {
     let slow = ["move.0.speed=30 mm/s", "move.0.points=['285 mm', '0 mm']", "move.0.until=22 s"];

@@ -167,8 +167,8 @@ fn stiffness_damping_and_delay() {
     assert!(low < 1.3 && 1.3 < high && high - low < 0.05, "{low} {high}");
 }
 
-/// Delays of many samples were states of the model, of which there were as many as the fit tried: it did not end on logs
-/// that are late, early or of the other sign.
+/// Delays of many samples were states of the model, of which there were as many as the fit tried: it did not end on
+/// logs that are late, early or of the other sign.
 #[test]
 fn long_delays_are_found_and_early_or_negated_outputs_are_named() {
     let truth = model(&stage(), 20.4e-3);

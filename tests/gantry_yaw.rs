@@ -1,4 +1,5 @@
-//! Yaw of a bridge on its bearings, against an integration of Lagrange's equations that shares nothing with the library.
+//! Yaw of a bridge on its bearings, against an integration of Lagrange's equations that shares nothing with the
+//! library.
 
 use crate::common;
 use taut::case::Case;

@@ -335,8 +335,9 @@ fn a_path_is_planned_within_the_limits_of_all_motors() {
     }
 }
 
-/// Strokes of 0.3 mm to 0.3 m in any direction, along one to three legs, on each kind of gantry: the case that is written
-/// is within its window when the plan states it, its references leave the reserve, and hardly a command is limited.
+/// Strokes of 0.3 mm to 0.3 m in any direction, along one to three legs, on each kind of gantry: the case that is
+/// written is within its window when the plan states it, its references leave the reserve, and hardly a command is
+/// limited.
 #[test]
 fn strokes_of_all_gantries_are_reached_when_their_plans_say() {
     let count = std::env::var("TAUT_CASES").ok().and_then(|text| text.parse().ok()).unwrap_or(6);

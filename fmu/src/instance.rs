@@ -373,8 +373,8 @@ impl Instance {
         pieces
     }
 
-    /// The reference of a slide from its five inputs, and the time from which it goes on by its derivatives, s: the last
-    /// one at which an input was set. A position that was set as a polynomial has its own, so that time is now.
+    /// The reference of a slide from its five inputs, and the time from which it goes on by its derivatives, s: the
+    /// last one at which an input was set. A position that was set as a polynomial has its own, so that time is now.
     pub(crate) fn reference(&self, role: fn(usize) -> Role, slide: usize) -> (f64, Reference) {
         let none = Input { since: self.begin, coefficients: [0.0; DEGREE + 1] };
         let own: [Input; REFERENCES] = std::array::from_fn(|k| {

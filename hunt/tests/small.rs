@@ -61,8 +61,8 @@ fn what_the_hunt_had_wrong_once_agrees() {
     }
 }
 
-/// Cases of model exchange in which a condition falls and rises again within a step of the hunt's importer, which looked
-/// at the ends of its steps alone: a pulley that sticks for 0.7 ms (4815), that turns round for 0.3 µs (5983).
+/// Cases of model exchange in which a condition falls and rises again within a step of the hunt's importer, which
+/// looked at the ends of its steps alone: a pulley that sticks for 0.7 ms (4815), that turns round for 0.3 µs (5983).
 #[test]
 fn an_importer_finds_conditions_that_fall_and_rise_within_a_step() {
     for number in [4815, 5983] {

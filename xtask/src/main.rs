@@ -3,10 +3,10 @@
 //! `cargo xtask data` fetches other people's measurements, `cargo xtask bad` writes the wrong inputs of `tests/bad` as
 //! whole files, `cargo xtask package` builds all that a release consists of and tries it,
 //! `cargo xtask hunt` looks for what is wrong with larger means, `cargo xtask coverage` and `cargo xtask faults` make
-//! the tables of docs/fit.md, `cargo xtask end-to-end` that of docs/tune.md, `cargo xtask counts` counts the instructions of standard works, `cargo xtask fmu` calls
-//! the functions of FMI at random under address sanitizer, `cargo xtask drag`, `cargo xtask load` and `cargo xtask
-//! first-fit` measure the studio, `cargo xtask web` makes a folder of it that needs no server, `cargo xtask book`
-//! builds the documents as a book and checks its links.
+//! the tables of docs/fit.md, `cargo xtask end-to-end` that of docs/tune.md, `cargo xtask counts` counts the
+//! instructions of standard works, `cargo xtask fmu` calls the functions of FMI at random under address sanitizer,
+//! `cargo xtask drag`, `cargo xtask load` and `cargo xtask first-fit` measure the studio, `cargo xtask web` makes a
+//! folder of it that needs no server, `cargo xtask book` builds the documents as a book and checks its links.
 
 mod bad;
 mod book;

@@ -1,7 +1,8 @@
 //! The looser of the two belts of a CoreXY from two spectra, each shaken by one motor while the other holds.
 //!
 //! Belt A is stretched by x + y less the motion a of its motor, belt B by x − y less that of its own. With the masses
-//! m_x and m_y moved along x and y, stiffnesses k and dampings c of the belts, dampings d of the rails, and motor A moved,
+//! m_x and m_y moved along x and y, stiffnesses k and dampings c of the belts, dampings d of the rails, and motor A
+//! moved,
 //!
 //! ```text
 //! (K + jωC − ω²M) X = (k_A + jω c_A) (1, 1)ᵀ a,  K = k_A [1 1; 1 1] + k_B [1 −1; −1 1]
@@ -77,8 +78,8 @@ const FLOOR: f64 = 0.01;
 const PER_BIN: usize = 4;
 /// Bins from the lower of the highest peaks of x and y over this, to the higher one times this.
 const RANGE: [f64; 2] = [1.6, 1.35];
-/// Lowest and highest frequency that is fitted, Hz. Klipper's sweep goes from 5 to 133 Hz by default, and a bin contains
-/// its neighbours.
+/// Lowest and highest frequency that is fitted, Hz. Klipper's sweep goes from 5 to 133 Hz by default, and a bin
+/// contains its neighbours.
 const FITTED: [f64; 2] = [12.0, 128.0];
 /// Fewest bins of a spectrum.
 const FEWEST: usize = 12;

@@ -297,8 +297,8 @@ mod tests {
     use crate::case::Case;
     use std::path::Path;
 
-    /// Rows and samples without figures are those with figures, to the last bit: of an axis with a delayed command, of an
-    /// H-frame and of a CoreXY.
+    /// Rows and samples without figures are those with figures, to the last bit: of an axis with a delayed command, of
+    /// an H-frame and of a CoreXY.
     #[test]
     fn figures_do_not_change_a_run() {
         let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages");

@@ -126,8 +126,8 @@ pub enum Damping {
 }
 
 /// Reads files of vibration (spectra, samples of an accelerometer, or cases), chooses shapers, and compares two
-/// spectra, with `belts` for the looser belt of a CoreXY. Errors: more than two files that are not taken together, files
-/// that cannot be read, options that do not fit them or the firmware.
+/// spectra, with `belts` for the looser belt of a CoreXY. Errors: more than two files that are not taken together,
+/// files that cannot be read, options that do not fit them or the firmware.
 ///
 /// ```no_run
 /// use taut::control::recommendation::{Question, recommend};

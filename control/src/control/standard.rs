@@ -43,7 +43,8 @@ pub struct Text {
 }
 
 impl Text {
-    /// Controller of a drive of `model` by `design`, with its share of a joint feed-forward if there are several drives.
+    /// Controller of a drive of `model` by `design`, with its share of a joint feed-forward if there are several
+    /// drives.
     pub fn of_drive(design: &Design, model: &Machine, drive: usize) -> Result<Self> {
         Ok(Self { forward: Forward::new(design.feed_forward, model, drive), ..Self::new(design, model)? })
     }
@@ -97,7 +98,8 @@ impl Text {
         }
     }
 
-    /// The reference of the encoder of one of several drives, from that of its part of the belt and those of all slides.
+    /// The reference of the encoder of one of several drives, from that of its part of the belt and those of all
+    /// slides.
     pub fn target<C: Calculator>(
         &self,
         c: &mut C,

@@ -85,9 +85,9 @@ impl Clocked {
         self.acting = self.waiting.pop_front().unwrap_or_default();
     }
 
-    /// Decides at [`Clocked::next`] from the state and the motors' currents, A; `references` are required at a sample, by
-    /// its number and time, s.
-    /// Returns the decision of each drive if that is a sample; a delayed command needs nothing.
+    /// Decides at [`Clocked::next`] from the state and the motors' currents, A; `references` are required at a sample,
+    /// by its number and time, s. Returns the decision of each drive if that is a sample; a delayed command needs
+    /// nothing.
     pub fn decide(
         &mut self,
         controllers: &mut [&mut dyn Controller],
@@ -133,8 +133,8 @@ impl Clocked {
     }
 }
 
-/// The controllers of all drives of a machine with their clock, delay and limit, between two of their decisions. A clone
-/// continues identically.
+/// The controllers of all drives of a machine with their clock, delay and limit, between two of their decisions. A
+/// clone continues identically.
 #[derive(Debug, Clone)]
 pub struct Stepped {
     controllers: Vec<Standard>,

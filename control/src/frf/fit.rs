@@ -143,8 +143,8 @@ fn curves(
                 .ok_or_else(|| Error::new(format!("the model has no {name}")).next("log another quantity"))
         };
         let outputs = same.iter().map(output).collect::<Result<Vec<_>>>()?;
-        // Whole samples of a delay are z⁻ⁿ. A straight input is delayed by e^{−jωt_d} alone, which leaves out what folds
-        // down from beyond half the sample rate.
+        // Whole samples of a delay are z⁻ⁿ. A straight input is delayed by e^{−jωt_d} alone, which leaves out what
+        // folds down from beyond half the sample rate.
         let whole = (delay / first.every).floor() * first.every;
         let (hold, within, late) = match first.hold {
             signal::Hold::Zero => (Hold::Zero, (delay - whole).max(0.0), whole),

@@ -104,8 +104,8 @@ pub(super) struct Inner<B> {
 }
 
 impl System {
-    /// Linear equations of `machine` about `operation`, for all inputs; [`StateSpace::new`] has those of the first input
-    /// alone.
+    /// Linear equations of `machine` about `operation`, for all inputs; [`StateSpace::new`] has those of the first
+    /// input alone.
     ///
     /// ```
     /// use taut::case::Case;
@@ -157,8 +157,8 @@ impl System {
         })
     }
 
-    /// ∏ over all masses, over inductances (resistances without one) and over the lengths of spans that follow the cart:
-    /// what the coefficients of `machine`'s equations have in their denominators.
+    /// ∏ over all masses, over inductances (resistances without one) and over the lengths of spans that follow the
+    /// cart: what the coefficients of `machine`'s equations have in their denominators.
     pub(crate) fn denominator(machine: &Machine, operation: Operation) -> f64 {
         let lengths = machine.span_lengths(&operation.coordinates(machine));
         let plant = machine.mechanism();

@@ -5,9 +5,9 @@
 //! ```
 //!
 //! over the independent bodies; A has a row for each stepper, whose field is a spring to its commanded angle. M is
-//! diagonal, except that a cart on a bridge that yaws adds m y to bridge and yaw and m y² to the yaw. Undamped modes are
-//! the eigenvectors of M^(−½) K M^(−½), or of L⁻¹ K L⁻ᵀ with M = L Lᵀ; the number of rigid ones, whose frequency is zero
-//! by construction, is the dimension of the null space of A.
+//! diagonal, except that a cart on a bridge that yaws adds m y to bridge and yaw and m y² to the yaw. Undamped modes
+//! are the eigenvectors of M^(−½) K M^(−½), or of L⁻¹ K L⁻ᵀ with M = L Lᵀ; the number of rigid ones, whose frequency is
+//! zero by construction, is the dimension of the null space of A.
 
 use super::{Root, eigen};
 use crate::error::{Error, Result};

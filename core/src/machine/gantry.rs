@@ -12,8 +12,9 @@
 //! ```
 //!
 //! A bridge that yaws by ψ has its left end at x − a ψ and its right one at x + a ψ, a being half the distance of the
-//! belts. A strand that pulls the cart to the left runs along the bridge to an idler at its left end, so that left has x
-//! − a ψ, right x + a ψ, back both; A out and B back, which pull to the right, have x + a ψ, A back and B out x − a ψ.
+//! belts. A strand that pulls the cart to the left runs along the bridge to an idler at its left end, so that left has
+//! x − a ψ, right x + a ψ, back both; A out and B back, which pull to the right, have x + a ψ, A back and B out x − a
+//! ψ.
 //!
 //! T = ½ J₁ φ̇₁² + ½ J₂ φ̇₂² + ½ (m_bridge + m_cart) ẋ² + ½ m_cart ẏ²: the cart rides along with the bridge.
 //! Sollmann, Jouaneh and Lavender, IEEE/ASME Transactions on Mechatronics 15(2), 2010, eq. (12)-(20), for the H-frame.

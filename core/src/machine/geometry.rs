@@ -108,7 +108,8 @@ pub struct SpanAt {
     pub on_yaw: f64,
     /// Change of its length from end to end per displacement of each slide; empty if its ends are fixed.
     pub follows: &'static [(usize, f64)],
-    /// Its elongation as a sum over those of `Geometry::telling_spans`, without yaw: the spans of a belt add up to zero.
+    /// Its elongation as a sum over those of `Geometry::telling_spans`, without yaw: the spans of a belt add up to
+    /// zero.
     pub by_others: &'static [(usize, f64)],
 }
 

@@ -100,7 +100,8 @@ impl Mechanism {
         Strain { way, strain, rate }
     }
 
-    /// The power balance at `state` under `input` in `mode`, of a machine with brushed motors whose bridge does not yaw.
+    /// The power balance at `state` under `input` in `mode`, of a machine with brushed motors whose bridge does not
+    /// yaw.
     pub fn power(&self, mode: Mode, state: &State, input: &[f64; DRIVES]) -> Power {
         let equations = self.equations(mode);
         let acceleration = equations.acceleration.map(|form| form.value(self, state, input));

@@ -494,8 +494,8 @@ impl AtInstant for OnPath {
 /// A requested limit: its name, its unit, and the value, if there is one.
 pub(super) type Requested = (&'static str, &'static str, Option<f64>);
 
-/// Those of these limits of speed, acceleration and jerk along a path that references exceed. An acceleration that jumps
-/// exceeds any jerk; on arcs, only the speed counts.
+/// Those of these limits of speed, acceleration and jerk along a path that references exceed. An acceleration that
+/// jumps exceeds any jerk; on arcs, only the speed counts.
 pub(super) fn along_path(profiles: &[Profile], limits: [Requested; 3]) -> Vec<Shortfall> {
     let arcs: Vec<[f64; 2]> = (profiles.iter().flat_map(Profile::passages))
         .filter(|passage| passage.turn.is_some())

@@ -200,8 +200,8 @@ fn regulated(phases: &Phases, speed: f64) -> Option<f64> {
     (voltage <= phases.supply).then_some(phases.torque_constant * amplitude)
 }
 
-/// Sine and cosine of the rotor's electrical angle over half a period at a constant speed, at the ends and in the middle
-/// of each step of the integration.
+/// Sine and cosine of the rotor's electrical angle over half a period at a constant speed, at the ends and in the
+/// middle of each step of the integration.
 struct HalfPeriod {
     /// rad/s
     speed: f64,

@@ -1,5 +1,5 @@
-//! Natural frequencies of a machine along its travel, from its masses and springs; a bridge that yaws has the mass matrix
-//! of the cart's position.
+//! Natural frequencies of a machine along its travel, from its masses and springs; a bridge that yaws has the mass
+//! matrix of the cart's position.
 
 use crate::error::{Error, Result};
 use crate::machine::{AmplifierMode, BeltModel, DriveAt, DriveUnit, Machine, Travel};

@@ -80,8 +80,8 @@ pub struct ErrorEstimate {
 }
 
 impl ErrorEstimate {
-    /// The solver of the second run. A sampled controller answers to the counts of an encoder, which a coarser run would
-    /// read differently far more often than the first one: its second run has a hundredth of the tolerance.
+    /// The solver of the second run. A sampled controller answers to the counts of an encoder, which a coarser run
+    /// would read differently far more often than the first one: its second run has a hundredth of the tolerance.
     pub fn second(first: Solver, is_sampled: bool) -> Solver {
         match first {
             Solver::General { tolerance } if is_sampled => {

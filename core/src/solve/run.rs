@@ -167,8 +167,8 @@ impl<'a> Run<'a> {
         self.advance(until)
     }
 
-    /// Follows these inputs, one for each drive, with a constant added to each, from now until `until`, s, or to the end
-    /// of the run; false if the run ended early.
+    /// Follows these inputs, one for each drive, with a constant added to each, from now until `until`, s, or to the
+    /// end of the run; false if the run ended early.
     pub fn hold_added(&mut self, inputs: &[Signal], added: &[f64], until: f64) -> bool {
         loop {
             let end = self.running.set_signals(inputs, added, self.time).min(until);

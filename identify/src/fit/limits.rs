@@ -288,7 +288,8 @@ pub(crate) const SWING_SHRINKS: f64 = 0.5;
 
 /// Steps, relative to the first, below which the search ends.
 ///
-/// Unit: 1. Source: chosen: of the frequency, a tenth of a radian along [`BLOCKS`]. Test: `intervals_hold_beside_a_tone`.
+/// Unit: 1. Source: chosen: of the frequency, a tenth of a radian along [`BLOCKS`]. Test:
+/// `intervals_hold_beside_a_tone`.
 pub(crate) const SWING_FINE: f64 = 1e-3;
 
 /// Longest time constant of noise that swings: a tone.
@@ -691,8 +692,8 @@ pub(crate) const INTERRUPTED_SHARE: f64 = 0.25;
 /// Unit: 1. Source: chosen: noise by third differences is not known better. Test: `limits_are_in_order`.
 pub(crate) const LEAST_INTERRUPTED: f64 = 1.5;
 
-/// Factors that are tried on a column where the model explains little: powers of ten, those of wrong pulleys, counts and
-/// pairs, and the units of angles and lengths, degrees and inches.
+/// Factors that are tried on a column where the model explains little: powers of ten, those of wrong pulleys, counts
+/// and pairs, and the units of angles and lengths, degrees and inches.
 ///
 /// Unit: 1. Source: chosen; SI. Test: `a_factor_on_a_column_is_named`.
 pub(crate) const FACTORS: [f64; 14] =
@@ -1414,7 +1415,8 @@ pub(crate) const MAP_ERRORS: f64 = 4.0;
 
 /// Most by which the error of a sine's amplitude grows beside the other sines of a map.
 ///
-/// Unit: the error by itself. Source: chosen: beyond it two sines nearly cancel. Test: `sines_that_cancel_are_not_named`.
+/// Unit: the error by itself. Source: chosen: beyond it two sines nearly cancel. Test:
+/// `sines_that_cancel_are_not_named`.
 pub(crate) const MAP_INFLATION: f64 = 3.0;
 
 /// Least amplitude of a periodic component in each half of the travel, relative to that in all of it.

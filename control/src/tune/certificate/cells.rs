@@ -1,17 +1,17 @@
 //! Bounds of |S| and |T| over a box of parameters and an interval of frequencies.
 //!
-//! The axis behind a hold and a delay τ has, at z = e^{jωT}, the response Σ H(s_m) G(s_m) over all m, s_m = j(ω + 2πm/T)
-//! and H(s) = e^{−sτ} (1 − e^{−sT})/(sT). With G = n/d and the controller D u = −N y, both sides times d and the poles of
-//! the controller,
+//! The axis behind a hold and a delay τ has, at z = e^{jωT}, the response Σ H(s_m) G(s_m) over all m, s_m = j(ω +
+//! 2πm/T) and H(s) = e^{−sτ} (1 − e^{−sT})/(sT). With G = n/d and the controller D u = −N y, both sides times d and the
+//! poles of the controller,
 //!
 //! ```text
 //! Δ = d (D + N R) + n N H(s₀),     R = Σ H(s_m) G(s_m) over m ≠ 0
 //! ```
 //!
 //! which like d and n is a polynomial in the parameters but for R, which is small and is bounded. |S| ≤ M means |X| ≤
-//! M |Δ| with the numerator X of S, and it holds if for each direction φ there is a θ with Re(M e^{−jθ} Δ − e^{−jφ} X) ≥ 0.
-//! That is linear in the coefficients of d and n, so its least value over the box is at least the least of those at
-//! Bernstein's coefficients.
+//! M |Δ| with the numerator X of S, and it holds if for each direction φ there is a θ with Re(M e^{−jθ} Δ − e^{−jφ} X)
+//! ≥ 0. That is linear in the coefficients of d and n, so its least value over the box is at least the least of those
+//! at Bernstein's coefficients.
 
 use super::axis::Axis;
 use super::forms::{Columns, Form, Numbers, Seen, Values, dot, parts};
@@ -247,8 +247,8 @@ impl Question<'_> {
         worst
     }
 
-    /// Σ H(s_m) G(s_m) over m ≠ 0, for each output, of the machine in the middle of the box, and how far that of another
-    /// machine may be from it.
+    /// Σ H(s_m) G(s_m) over m ≠ 0, for each output, of the machine in the middle of the box, and how far that of
+    /// another machine may be from it.
     fn aliases(&self, table: &Table, middle: f64, half: f64) -> Vec<(Jet, f64)> {
         let orders = &self.axis.orders;
         let most_power = orders.iter().copied().max().unwrap_or(1);

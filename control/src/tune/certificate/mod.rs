@@ -4,8 +4,8 @@
 //! The box has the half-widths of a family times a factor, and all its positions and loads. Its transfer functions are
 //! polynomials in the parameters (`axis.rs`); their values over a part of the box and an interval of frequencies are
 //! enclosed (`cells.rs`, `forms.rs`), and box and frequencies are divided until the limits hold everywhere, or the
-//! budget is spent. If the closed loop of one machine of the box is stable and no machine has a pole on the unit circle,
-//! all are stable.
+//! budget is spent. If the closed loop of one machine of the box is stable and no machine has a pole on the unit
+//! circle, all are stable.
 
 mod axis;
 mod cells;

@@ -59,8 +59,8 @@ impl Settled<'_> {
         Assessed { fit, surveys, judged }
     }
 
-    /// The information of the logs there, with the tests of their parts and of the friction law, and of missing elements
-    /// unless these `surveys` of the logs explain the residuals; `None` if numbers fail.
+    /// The information of the logs there, with the tests of their parts and of the friction law, and of missing
+    /// elements unless these `surveys` of the logs explain the residuals; `None` if numbers fail.
     fn judged(&self, case: &Case, plan: &Plan, surveys: &[Survey]) -> Option<Judged> {
         let Minimum { residuals, jacobian, x, at_bound, .. } = &self.searched.best;
         let mut judged = match self.seen.as_ref().filter(|_| !at_bound.contains(&true)) {

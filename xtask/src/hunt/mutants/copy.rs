@@ -49,9 +49,9 @@ fn reach(k: usize) {
 const LIBRARY: &str = "core/src/lib.rs";
 const SWITCHES: &str = "core/src/mutant.rs";
 
-/// The programs of tests: name, package, folder of the package, target. `lib`, `core`, `case`, `control`, `identify` and
-/// `export` are the tests within the crates of the library, `all` those beside it, `hunt` those of the small hunt, `fmu`
-/// those of the shared object, `cli` those of the program `taut`, which hands the switch on.
+/// The programs of tests: name, package, folder of the package, target. `lib`, `core`, `case`, `control`, `identify`
+/// and `export` are the tests within the crates of the library, `all` those beside it, `hunt` those of the small hunt,
+/// `fmu` those of the shared object, `cli` those of the program `taut`, which hands the switch on.
 const PROGRAMS: [(&str, &str, &str, &str); 10] = [
     ("lib", "taut", "", "lib"),
     ("core", "taut-core", "core", "lib"),

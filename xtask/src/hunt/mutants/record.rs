@@ -1,9 +1,9 @@
 //! What a hunt for mutants has found so far, so that an interrupted hunt goes on where it ended.
 //!
-//! The folder `target/mutants/records/HASH` belongs to the library's source and the changes built into it. `tests` has a
-//! line for each test that ran without a change: name, seconds, numbers of the changes that it reaches; `trials` one for
-//! each test that ran with a change: number, how it ended, name. Tests that are added or are made anew are run; a test
-//! that was edited keeps its lines until the folder is deleted.
+//! The folder `target/mutants/records/HASH` belongs to the library's source and the changes built into it. `tests` has
+//! a line for each test that ran without a change: name, seconds, numbers of the changes that it reaches; `trials` one
+//! for each test that ran with a change: number, how it ended, name. Tests that are added or are made anew are run; a
+//! test that was edited keeps its lines until the folder is deleted.
 
 use super::Trial;
 use super::change::Change;
