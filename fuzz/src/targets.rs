@@ -14,6 +14,7 @@ use taut::linear::{Analysis, Operation, Question, StateSpace};
 use taut::log::{Accelerometer, ColumnId, Dialect, Filter, Log, Mapping, Quantity, Source, Survey, read_accelerometer};
 use taut::machine::Machine;
 use taut::metrics::Meter;
+use taut::signal::Signal;
 use taut::signal::gcode::legs;
 use taut::signal::profile::{Limits, Passage, Profile};
 use taut::solve::{self, Course, Detail, Ending, Flow, Outcome, Solver};
@@ -26,6 +27,8 @@ const ROWS: f64 = 200.0;
 const LONGEST: f64 = 0.1;
 /// Phase that the fastest mode may turn through in a run, rad: how stiff it may be.
 const PHASE: f64 = 2000.0;
+/// Pieces of an input in a run, at most; a period of a sine has 26.
+const PIECES: usize = 1000;
 
 /// Cases, and everything that they name, are looked for from here.
 pub(crate) fn repository() -> PathBuf {
@@ -106,7 +109,7 @@ fn gantry(name: &Path, case: &Case) -> Reached {
     let (Some(experiment), true) = (case.experiments.first(), fastest.is_finite()) else { return Reached::Read };
     let mechanism = case.machine.mechanism();
     let mut course = Course::new(&mechanism, experiment);
-    course.until = course.until.min(LONGEST.min(PHASE / fastest.max(1e-300)));
+    course.until = course.until.min(LONGEST.min(PHASE / fastest.max(1e-300))).min(end_of_pieces(&course.inputs));
     course.every = course.every.min(course.until).max(course.until / ROWS);
     let mut meter = Meter::new(&case.machine, experiment);
     let mut finite = true;
@@ -124,6 +127,15 @@ fn gantry(name: &Path, case: &Case) -> Reached {
     Reached::Read
 }
 
+/// When the first input has had [`PIECES`], s.
+fn end_of_pieces(inputs: &[Signal]) -> f64 {
+    let of_one = |input: &Signal| {
+        let next = |end: &f64| Some(input.piece(*end).end).filter(|_| end.is_finite());
+        std::iter::successors(Some(0.0), next).take(PIECES).last().unwrap_or(f64::INFINITY)
+    };
+    inputs.iter().map(of_one).fold(f64::INFINITY, f64::min)
+}
+
 /// How long a machine may run, s; none where its equations say nothing.
 fn longest(stage: &Machine) -> Option<f64> {
     let poles = StateSpace::new(stage, Operation::default()).and_then(|model| model.poles()).ok()?;
@@ -132,7 +144,7 @@ fn longest(stage: &Machine) -> Option<f64> {
 }
 
 fn run(stage: &Machine, experiment: &Experiment, longest: f64) {
-    let until = experiment.until.min(longest);
+    let until = experiment.until.min(longest).min(end_of_pieces(&experiment.inputs));
     let every = experiment.every.min(until).max(until / ROWS);
     let short = Experiment { until, every, ..experiment.clone() };
     let mut finite = true;

@@ -3,6 +3,7 @@
 use super::files::Folder;
 use super::reader::{Field, Table, nearest};
 use crate::error::{Error, Result};
+use crate::machine::Machine;
 use crate::quantity;
 use crate::signal::{Hold, Signal, Slot, Tone};
 use std::f64::consts::PI;
@@ -30,6 +31,9 @@ const DEEPEST: usize = 8;
 /// Most periods, or bits, of an input within one run.
 const MOST_PERIODS: f64 = 1e8;
 
+/// Most periods of a stepper's command: all of its pieces are searched for jumps as it is read.
+const MOST_OF_A_COMMAND: f64 = 2e5;
+
 /// Most sines of a multisine.
 const MOST_TONES: usize = 1000;
 
@@ -39,6 +43,16 @@ pub(super) struct Context<'a> {
     pub folder: &'a Folder<'a>,
     /// End of the run, s.
     pub until: f64,
+    /// Most periods, or bits, within the run.
+    most_periods: f64,
+}
+
+impl<'a> Context<'a> {
+    /// Of an experiment of this machine that ends at `until`, s.
+    pub fn new(machine: &Machine, folder: &'a Folder<'a>, until: f64) -> Self {
+        let most_periods = if machine.stepper().is_some() { MOST_OF_A_COMMAND } else { MOST_PERIODS };
+        Self { folder, until, most_periods }
+    }
 }
 
 /// An input; `field` is its table.
@@ -68,7 +82,7 @@ fn nested(field: &Field, context: &Context, depth: usize, in_sequence: bool) -> 
     let Some(main) = table.optional(kind) else { return Err(field.fail("no kind")) };
     let main = main.named(format!("input.{kind}"));
     let number = |key: &str| table.number(key);
-    let periods = |frequency: f64, key: &str| few_enough(&table, key, frequency * context.until);
+    let periods = |frequency: f64, key: &str| few_enough(&table, key, frequency * context.until, context);
     Ok(match kind {
         "step" => Signal::Step { value: main.number()?, at: number("at")? },
         "pulse" => Signal::Pulse { value: main.number()?, duration: number("for")?, at: number("at")? },
@@ -91,13 +105,13 @@ fn nested(field: &Field, context: &Context, depth: usize, in_sequence: bool) -> 
         }
         "chirp" => {
             let (from, to, over) = (number("from")?, number("to")?, number("over")?);
-            few_enough(&table, "to", from.max(to) * over.min(context.until))?;
+            few_enough(&table, "to", from.max(to) * over.min(context.until), context)?;
             Signal::Chirp { amplitude: main.number()?, from, to, over }
         }
         "multisine" => multisine(main.number()?, &table, context)?,
         "prbs" => {
             let bit = number("bit")?;
-            few_enough(&table, "bit", context.until / bit)?;
+            few_enough(&table, "bit", context.until / bit, context)?;
             Signal::Prbs { amplitude: main.number()?, bit, seed: table.seed()? }
         }
         "table" => points(&main)?,
@@ -132,14 +146,14 @@ fn kind(table: &Table) -> Result<&'static str> {
     }
 }
 
-fn few_enough(table: &Table, key: &str, periods: f64) -> Result<()> {
-    if periods <= MOST_PERIODS {
+fn few_enough(table: &Table, key: &str, periods: f64, context: &Context) -> Result<()> {
+    if periods <= context.most_periods {
         return Ok(());
     }
     let field = table.optional(key).unwrap_or_else(|| table.field.clone());
     Err(field
         .fail(format!("this makes {} periods within the run", quantity::rounded(periods)))
-        .allowed(format!("up to {}", quantity::rounded(MOST_PERIODS))))
+        .allowed(format!("up to {}", quantity::rounded(context.most_periods))))
 }
 
 /// Equal sines with phases that keep the peak of their sum low.
@@ -177,7 +191,7 @@ fn multisine(amplitude: f64, table: &Table, context: &Context) -> Result<Signal>
             (0..tones as usize).map(|i| from + (to - from) * i as f64 / (tones - 1.0)).collect()
         }
     };
-    few_enough(table, "frequencies", frequencies.iter().sum::<f64>() * context.until)?;
+    few_enough(table, "frequencies", frequencies.iter().sum::<f64>() * context.until, context)?;
     let n = frequencies.len() as f64;
     let tone = |(i, frequency): (usize, f64)| {
         // φ_k = −π k (k − 1) / N, k = 1 … N: Schroeder's phases for equal amplitudes

@@ -383,7 +383,7 @@ fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<E
     let name = named(&table)?;
     let Some(log) = table.optional("log") else {
         let (until, every) = times(&table, None)?;
-        let inputs = inputs(&table, machine, &input::Context { folder, until })?;
+        let inputs = inputs(&table, machine, &input::Context::new(machine, folder, until))?;
         let initial = initial(&table, machine)?;
         if let Some(field) = table.optional("input").filter(|_| machine.stepper().is_some()) {
             stepper::check_commands(&field, machine, &inputs, (&initial, until))?;
@@ -396,7 +396,7 @@ fn experiment(field: &Field, machine: &Machine, folder: &Folder) -> Result<Vec<E
         let (until, every) = times(&table, Some(&log))?;
         let inputs = match driven {
             true => {
-                let signals = inputs(&table, machine, &input::Context { folder, until })?;
+                let signals = inputs(&table, machine, &input::Context::new(machine, folder, until))?;
                 let values = |signal: &Signal| log.time.iter().map(|&t| signal.value(t)).collect();
                 log.inputs = signals.iter().map(values).collect();
                 signals
