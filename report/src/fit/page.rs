@@ -25,12 +25,8 @@ pub fn page_with(case: &Case, found: &FitResults, text: &str, first: impl FnOnce
         page.callout(kind, grade, text.to_string());
     }
     page.prose(format!(
-        "{} values, {} variables, {} steps, {} simulated logs{}.",
-        fit.values,
-        fit.variables,
-        fit.work.iterations,
-        fit.work.simulations,
-        told::past_kinks(fit)
+        "{} values, {} variables, {} steps, {} simulated logs.",
+        fit.values, fit.variables, fit.work.iterations, fit.work.simulations,
     ));
     parameters(&mut page, fit);
     correlations(&mut page, fit);
