@@ -53,6 +53,8 @@ pub struct Arrival {
     pub axes: usize,
     /// Largest error of a sliding part on the machine of the file, m.
     pub cart_error: f64,
+    /// Longest time for which the command or the amplifier of a drive is at its limit on the machine of the file, s.
+    pub saturated: f64,
 }
 
 /// A tried plan.
@@ -198,6 +200,8 @@ struct Ran {
     arrives: Option<f64>,
     /// Largest error of a sliding part, m.
     error: f64,
+    /// Longest time for which the command or the amplifier of a drive is at its limit, s.
+    saturated: f64,
     /// Least and greatest force in each span relative to the pretension, N; none for several drives, whose belts are
     /// not limited.
     spans: Vec<[Peak; 2]>,
@@ -474,6 +478,7 @@ impl Planner<'_> {
         Ok(Ran {
             arrives: settling.map(|settling| Profile::last_end(profiles) + settling),
             error: run.figures.worst_load().error.peak.value.abs(),
+            saturated: run.figures.saturated(),
             spans: if machine.drives.len() == 1 { run.figures.spans } else { Vec::new() },
         })
     }
@@ -530,7 +535,7 @@ impl Planner<'_> {
     ) -> Result<(Arrival, Ran)> {
         let closely = |machine| (machine, Solver::for_machine(machine));
         let ran = self.run(motion, profiles, closely(&self.family.machine))?;
-        (arrival.nominal, arrival.cart_error) = (ran.arrives, ran.error);
+        arrival = Arrival { nominal: ran.arrives, cart_error: ran.error, saturated: ran.saturated, ..arrival };
         if let (true, Some(worst), Some(machine)) =
             (self.family.machine.mechanism().is_stepped(), arrival.worst, slowest)
         {
@@ -577,6 +582,7 @@ impl Arrival {
             settled: usize::from(ran.arrives.is_some()),
             axes: 1,
             cart_error: ran.error,
+            saturated: ran.saturated,
         }
     }
 }

@@ -57,6 +57,7 @@ fn arrival(arrival: &Arrival) -> Value {
     json!({
         "duration_s": arrival.duration, "in_window_s": arrival.nominal, "in_window_worst_s": arrival.worst,
         "axes": arrival.axes, "settled": arrival.settled, "cart_error_m": number(arrival.cart_error),
+        "saturated_s": arrival.saturated,
     })
 }
 

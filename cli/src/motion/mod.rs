@@ -236,7 +236,7 @@ fn status(tried: &[Tried], interrupt: &Interrupt) -> (Status, Vec<Remark>) {
 
 /// How long the command or the amplifier stood at its limit, in words; none if neither did.
 fn saturated(done: &Done) -> Option<String> {
-    let ((samples, limited), amplifier) = (done.run.samples, done.run.figures.drive().amplifier_limited);
+    let ((samples, limited), amplifier) = (done.run.samples, done.run.figures.amplifier_limited());
     if limited > 0 {
         return Some(format!("{limited} of {samples} samples are at the controller's limit"));
     }

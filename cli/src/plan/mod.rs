@@ -14,6 +14,7 @@ use taut::json;
 use taut::planning::{Planned, plan};
 use taut::reach::quickest::Wanted;
 use taut_report::plan::{figures, page};
+use taut_report::simulate::time;
 
 /// Reads the case, plans, writes, tells.
 pub fn run(args: &Args) -> Outcome {
@@ -71,7 +72,8 @@ pub fn run(args: &Args) -> Outcome {
     finished.finish(common, folder)
 }
 
-/// A word about a plan of which the cart does not arrive, or later than with the limits of the file.
+/// A word about a plan whose cart does not arrive, that saturates, or that arrives later than with the limits of the
+/// file.
 fn remark(planned: &Planned) -> Option<Remark> {
     let name = &planned.name;
     let arrival = if planned.is_kept { &planned.given } else { &planned.best.arrival };
@@ -79,6 +81,12 @@ fn remark(planned: &Planned) -> Option<Remark> {
         let of = format!("{} of {} axes", arrival.settled, arrival.axes);
         return Some(Remark::Warning(format!(
             "the cart stays in its window after the move \"{name}\" on {of}: better gains (`taut tune`) or a wider window"
+        )));
+    }
+    if arrival.saturated > 0.0 {
+        return Some(Remark::Warning(format!(
+            "the move \"{name}\" saturates for {}, though its reference needs less: feed-forward, or a larger --reserve",
+            time(arrival.saturated)
         )));
     }
     planned.is_kept.then(|| {

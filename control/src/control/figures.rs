@@ -64,6 +64,16 @@ impl Figures {
         self.drives.iter().map(|drive| drive.current.1).fold(0.0, f64::max)
     }
 
+    /// Longest time for which the amplifier of a drive was at its limit, s.
+    pub fn amplifier_limited(&self) -> f64 {
+        self.drives.iter().map(|drive| drive.amplifier_limited).fold(0.0, f64::max)
+    }
+
+    /// Longest time for which the command or the amplifier of a drive was at its limit, s.
+    pub fn saturated(&self) -> f64 {
+        self.drives.iter().map(|drive| drive.limited).fold(self.amplifier_limited(), f64::max)
+    }
+
     /// The figures of the first drive.
     pub fn drive(&self) -> DriveFigures {
         self.drives.first().copied().unwrap_or_default()
