@@ -346,8 +346,48 @@ fn closed_loops_agree_with_an_integration_that_shares_no_code() {
 
 /// A CoreXY with dry friction, encoders and limits, with these lines more.
 fn rig(changes: &[&str]) -> Case {
-    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/core-xy/square.toml");
+    stage("core-xy/square.toml", changes)
+}
+
+fn stage(name: &str, changes: &[&str]) -> Case {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("stages").join(name);
     Case::read_with(path, changes).unwrap()
+}
+
+/// Those of a dual belt were of the mean of its motors, and the yaw of a bridge was left out.
+#[test]
+fn following_errors_are_those_of_each_motor() {
+    const YAW: &str = "bridge.yaw={ inertia = 0.02, belt_spacing = 0.5, bearing_spacing = 0.06, \
+                       bearing_stiffness = 2e7, bearing_damping = 500 }";
+    for (name, changes) in [
+        ("core-xy/square.toml", &[][..]),
+        ("core-xy/square.toml", &[YAW]),
+        ("h-frame/square.toml", &[YAW]),
+        ("dual-belt/square.toml", &["right_drive.motor.resistance=1.4"]),
+    ] {
+        let case = stage(name, changes);
+        let Some(motion) = case.moves.first() else { panic!("{name} has no move") };
+        let h = 5e-5;
+        let (run, rows) = moved(&case, motion, h);
+        let references = motion.references(case.controller.as_ref().unwrap());
+        let (geometry, shares) = (case.machine.geometry(), case.machine.belt_shares());
+        for ((at, shares), drive) in geometry.drives.iter().zip(shares).zip(&run.figures.drives) {
+            let angles = rows.get(&format!("{}_angle", geometry.label(at.pulley).key)).unwrap();
+            // y − r φ
+            let off = |(time, angle): (&f64, &f64)| {
+                let y: f64 = shares.iter().zip(&references).map(|(share, one)| share * one.at(*time).position).sum();
+                y - case.machine.pulley_radius * angle
+            };
+            let off: Vec<f64> = rows.get("time").unwrap().iter().zip(angles).map(off).collect();
+            let most = off.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+            let square: f64 = off.windows(2).map(|pair| 0.5 * h * (pair[0].powi(2) + pair[1].powi(2))).sum();
+            let (rms, following) = ((square / motion.until).sqrt(), drive.following);
+            let told = format!("{name} {changes:?} {}: {following:?}, {most} and {rms} by the rows", at.side());
+            assert!((following.peak.value.abs() - most).abs() < 1e-7, "{told}");
+            assert!((following.rms - rms).abs() < 1e-4 * rms + 1e-9, "{told}");
+            assert!((following.last - off[off.len() - 1]).abs() < 1e-12, "{told}");
+        }
+    }
 }
 
 #[test]

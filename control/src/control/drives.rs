@@ -37,9 +37,10 @@ pub struct DriveGain {
     pub unit: &'static str,
 }
 
-/// Gains for an axis moving forward; in volts in voltage mode.
+/// Gains for an axis moving forward; in volts in voltage mode. None for several drives, or for a stepper, whose command
+/// is a position.
 pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
-    if machine.drives.len() > 1 {
+    if machine.drives.len() > 1 || machine.stepper().is_some() {
         return Vec::new();
     }
     let rigid = Rigid::new(machine);
@@ -63,7 +64,7 @@ pub fn drive_gains(machine: &Machine) -> Vec<DriveGain> {
                 one("LinuxCNC", "FF3", 1e-3 * jerk, "V/(mm/s^3)"),
             ]
         }
-        AmplifierMode::Current | AmplifierMode::Position => {
+        _ => {
             vec![one("LinuxCNC", "FF1", 1e-3 * v, "A/(mm/s)"), one("LinuxCNC", "FF2", 1e-3 * a, "A/(mm/s^2)")]
         }
     };

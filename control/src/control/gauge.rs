@@ -39,8 +39,6 @@ struct LoadGauge {
     position: usize,
     /// Its peak speed, if the readings do not contain its speed.
     peak_speed: Option<Peak>,
-    /// Position by the drives minus true position as a sum of elongations: reading and weight.
-    stretches: Vec<(usize, f64)>,
     /// Time (s) and direction of overshoot: [`Passage::approach`] of the last leg that moves it.
     approach: (f64, f64),
     target: f64,
@@ -63,6 +61,8 @@ struct DriveGauge {
     voltage: Voltage,
     /// Weights of the coordinates in the position of its part of the belt.
     shares: &'static [f64],
+    /// That position by the slides minus r φ as a sum of elongations: reading and weight.
+    elongations: Vec<(usize, f64)>,
     /// ∫ of the squares of following error, voltage and current.
     squares: [f64; 3],
     /// True if a limit of its amplifier is active now.
@@ -105,7 +105,6 @@ impl LoadGauge {
     fn new((slide, profile): (&SlideAt, &Profile), mechanism: &Mechanism) -> Self {
         let find = |shown: Shown| mechanism.readings.iter().position(|reading| *reading == shown);
         let mut approaches = profile.passages().iter().rev().map(Passage::approach);
-        let stretch = |&(span, weight): &(usize, f64)| Some((find(Shown::Stretch(span))?, weight));
         Self {
             body: slide.body,
             position: find(Shown::Position(slide.body, 1.0)).unwrap_or_default(),
@@ -113,7 +112,6 @@ impl LoadGauge {
                 Some(_) => None,
                 None => Some(Peak::default()),
             },
-            stretches: slide.error.iter().filter_map(stretch).collect(),
             approach: approaches.find(|(_, direction)| *direction != 0.0).unwrap_or_default(),
             target: profile.target(),
             reached: 0.0,
@@ -197,6 +195,7 @@ impl SpanGauge {
 impl DriveGauge {
     fn new(machine: &Machine, mechanism: &Mechanism, drive: usize) -> Self {
         let find = |shown: Shown| mechanism.readings.iter().position(|reading| *reading == shown);
+        let elongations = machine.elongations_of_drives(mechanism).swap_remove(drive);
         let mechanisms_drive = &mechanism.drives[drive];
         let motor = &mechanisms_drive.motor;
         Self {
@@ -213,6 +212,10 @@ impl DriveGauge {
                 },
             },
             shares: machine.belt_shares()[drive],
+            elongations: elongations
+                .into_iter()
+                .filter_map(|(spring, weight)| Some((find(Shown::Stretch(spring))?, weight)))
+                .collect(),
             squares: [0.0; 3],
             saturated: false,
             seen: DriveFigures::default(),
@@ -298,14 +301,14 @@ impl<'a> Gauge<'a> {
             return;
         }
         for drive in &mut self.drives {
-            // y − r φ as a sum of y − x less the elongations between; y − r φ₁ = y − x − d₁ of an axis
+            // y − r φ = Σ s (y − x) + Σ w d; y − r φ₁ = y − x − d₁ of an axis
             let mut following = Polynomial([0.0; TERMS]);
-            for ((load, error), share) in self.loads.iter().zip(&errors).zip(drive.shares) {
+            for (error, share) in errors.iter().zip(drive.shares) {
                 following.0.iter_mut().zip(error.0).for_each(|(sum, term)| *sum += share * term);
-                for &(stretch, weight) in &load.stretches {
-                    let stretch = curve.polynomial(stretch);
-                    following.0.iter_mut().zip(stretch.0).for_each(|(sum, term)| *sum -= share * weight * term);
-                }
+            }
+            for &(elongation, weight) in &drive.elongations {
+                let elongation = curve.polynomial(elongation);
+                following.0.iter_mut().zip(elongation.0).for_each(|(sum, term)| *sum += weight * term);
             }
             larger(&mut drive.seen.following.peak, &following, part, curve);
             drive.squares[0] += curve.length * square(&following, part);

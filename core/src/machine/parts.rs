@@ -11,6 +11,7 @@ use crate::mechanism::{
     self, BODIES, BODIES_AND_DRIVES, Body, Drive, Follows, Heading, Label, Mechanism, Over, Ride, Roles, SPRINGS,
     Shown, Spring, SpringLaw, State,
 };
+use nalgebra::{DMatrix, DVector};
 
 /// The yaw of a bridge, as a body and as what its bearings hold.
 const YAW: Label = Label { key: "yaw", name: "yaw of the bridge" };
@@ -371,6 +372,33 @@ impl Machine {
     pub fn belt_shares(&self) -> Vec<&'static [f64]> {
         let geometry = self.geometry();
         geometry.drives.iter().map(|drive| geometry.bodies[drive.pulley].by_slides).collect()
+    }
+
+    /// Position of each drive's part of the belt by the slides minus r φ of its pulley as a sum over elongations d = A q:
+    /// springs and their weights w.
+    ///
+    /// ```text
+    /// Σ s x − r φ = Σ w d
+    /// ```
+    pub fn elongations_of_drives(&self, mechanism: &Mechanism) -> Vec<Vec<(usize, f64)>> {
+        let geometry = self.geometry();
+        let springs: Vec<usize> = geometry.telling_spans().chain(self.yaw_spring()).collect();
+        let form = |terms: &[(usize, f64)]| {
+            let mut form = DVector::zeros(mechanism.bodies.len());
+            terms.iter().for_each(|&(body, arm)| form[mechanism.leader(body)] += arm * mechanism.ratio(body));
+            form
+        };
+        let arms: Vec<DVector<f64>> = springs.iter().map(|&spring| form(&mechanism.springs[spring].arms)).collect();
+        let arms = DMatrix::from_columns(&arms).svd(true, true);
+        let of_drive = |(drive, shares): (&DriveAt, &[f64])| {
+            let slides = geometry.slides.iter().zip(shares).map(|(slide, share)| (slide.body, *share));
+            let terms: Vec<(usize, f64)> = slides.chain([(drive.pulley, -self.pulley_radius)]).collect();
+            let weights = arms.solve(&form(&terms), 1e-9 * arms.singular_values.max()).unwrap_or_default();
+            // Of spans they are simple fractions, here without their rounding.
+            let simple = |w: f64| if (64.0 * w - (64.0 * w).round()).abs() < 1e-9 { (64.0 * w).round() / 64.0 } else { w };
+            springs.iter().copied().zip(weights.iter().map(|w| simple(*w))).collect()
+        };
+        geometry.drives.iter().zip(self.belt_shares()).map(of_drive).collect()
     }
 
     /// Positions of the slides by the drives, m, from the angles of all bodies.
