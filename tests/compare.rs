@@ -65,7 +65,7 @@ fn the_law_of_the_machine_is_chosen() {
 }
 
 /// A comparison with curved laws did not end on a record of 25 s: each of them was searched to a thousandth of a
-/// standard error in windows of every length. Now Stribeck curves are compared as
+/// standard error in windows of every length, by evolution where it stalled. Now Stribeck curves are compared as
 /// straight lines, with exact derivatives, in all windows; laws without exact derivatives have the windows that predict
 /// best without them; and all go as far as laws can be told apart.
 #[test]

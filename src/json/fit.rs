@@ -152,6 +152,7 @@ pub fn fit(case: &Case, fit: &Fit, profiles: &[Profile], posterior: Option<Value
         "last_step_standard_errors": number(fit.decrement),
         "cost": number(fit.cost),
         "kink_gradients": fit.pieces,
+        "evolutions": fit.evolved,
         "starts": fit.starts.iter().map(|cost| number(*cost)).collect::<Vec<_>>(),
         "values": fit.values,
         "variables": fit.variables,

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use std::time::Duration;
 use taut::case::Case;
 use taut::number;
-use taut_report::fit::{FitResults, crooked, ending, findings, scores, value, words};
+use taut_report::fit::{FitResults, crooked, ending, findings, past_kinks, scores, value, words};
 
 /// The text on the terminal.
 pub fn text(case: &Case, found: &FitResults, took: Duration) -> String {
@@ -66,11 +66,12 @@ pub fn text(case: &Case, found: &FitResults, took: Duration) -> String {
     }
     let _ = writeln!(
         text,
-        "\n{} values, {} variables; {} steps, {} simulated logs\n  took {}",
+        "\n{} values, {} variables; {} steps, {} simulated logs{}\n  took {}",
         fit.values,
         fit.variables,
         fit.work.iterations,
         fit.work.simulations,
+        past_kinks(fit),
         number::engineering_typed(took.as_secs_f64(), "s", 3),
     );
     text

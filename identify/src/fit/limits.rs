@@ -85,6 +85,16 @@ pub(crate) const SHARP: f64 = 0.1;
 /// Unit: standard errors of a variable by itself. Source: chosen. Test: `limits_are_in_order`.
 pub(crate) const PAST_KINKS: f64 = 0.3;
 
+/// Maximum number of variables that evolution searches.
+///
+/// Unit: variables. Source: chosen; its cost grows with their square.
+pub(crate) const MOST_EVOLVED: usize = 16;
+
+/// Generations without a gain of `SHOWS` after which an evolution ends.
+///
+/// Unit: generations. Source: chosen. Test: `limits_are_in_order`.
+pub(crate) const BARREN: usize = 8;
+
 /// Promised gain at which a minimum on a kink counts as converged: of all gradients around together, or of one that no
 /// step of any length fulfilled.
 ///
@@ -97,9 +107,9 @@ pub(crate) const KINK: f64 = 0.1;
 /// Unit: standard errors. Source: a tenth of what noise makes of an estimate. Test: `limits_are_in_order`.
 pub(crate) const SHOWS: f64 = 0.1;
 
-/// Step size along the longest axis at which the evolution of an input ends.
+/// Step size along the longest axis at which an evolution ends.
 ///
-/// Unit: units of the search, logits of a share. Source: chosen. Test: `the_lowest_point_of_a_long_valley_is_found`.
+/// Unit: units of the search, here standard errors. Source: chosen. Test: `the_lowest_point_of_a_long_valley_is_found`.
 pub(crate) const SMALLEST_STEP: f64 = 0.01;
 
 /// Share of its promised gain that a step of a bundle must keep to be taken.

@@ -9,7 +9,7 @@ mod rows;
 mod value;
 
 pub use page::{page, page_with};
-pub use rows::{crooked, ending, findings, outputs, scores, words};
+pub use rows::{crooked, ending, findings, outputs, past_kinks, scores, words};
 pub use value::value;
 
 use taut::fit::{Fit, Posterior, Profile};

@@ -25,8 +25,12 @@ pub fn page_with(case: &Case, found: &FitResults, text: &str, first: impl FnOnce
         page.callout(kind, grade, text.to_string());
     }
     page.prose(format!(
-        "{} values, {} variables, {} steps, {} simulated logs.",
-        fit.values, fit.variables, fit.work.iterations, fit.work.simulations,
+        "{} values, {} variables, {} steps, {} simulated logs{}.",
+        fit.values,
+        fit.variables,
+        fit.work.iterations,
+        fit.work.simulations,
+        told::past_kinks(fit)
     ));
     parameters(&mut page, fit);
     correlations(&mut page, fit);

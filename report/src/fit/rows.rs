@@ -24,6 +24,15 @@ pub fn findings<'a>(all: impl Iterator<Item = &'a Finding> + Clone) -> Vec<Strin
     told
 }
 
+/// The search past kinks, where derivatives did not help; empty where there was none.
+pub fn past_kinks(fit: &Fit) -> String {
+    match fit.evolved {
+        0 => String::new(),
+        1 => "; where events change their order: an evolution strategy".into(),
+        times => format!("; where events change their order: an evolution strategy, {times} times"),
+    }
+}
+
 /// Parameters whose interval is not to be believed on one side.
 pub fn crooked(profiles: &[Profile]) -> Vec<&str> {
     profiles.iter().filter(|profile| profile.is_crooked()).map(|profile| profile.name.as_str()).collect()

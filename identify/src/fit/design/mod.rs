@@ -11,7 +11,6 @@
 //! for the k parameters in the criterion; the others are also free. J is that of a fit to a log simulated by the model.
 
 mod candidates;
-mod cmaes;
 mod criterion;
 mod driven;
 mod limits;

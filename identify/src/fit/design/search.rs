@@ -1,7 +1,6 @@
 //! The search: points spread over the variables of each kind of input, then an evolution strategy from the best ones.
 
 use super::candidates::{Excitation, SearchLimits, Shape};
-use super::cmaes;
 use super::criterion::Information;
 use super::driven::Driven;
 use super::limits::{Limits, Reached};
@@ -15,6 +14,7 @@ use crate::fit::limits::{
     DESIGN_BARREN, FINALISTS, FIRST_POINTS, FIRST_SIGMA, HOPEFUL, MOST_COMPARED, MOST_PERIODS, MOST_ROWS, MOST_VALUES,
     OF_RATE,
 };
+use crate::fit::search::cmaes;
 use crate::machine::{Channel, Machine};
 use crate::mechanism::State;
 use rand_pcg::Pcg64;

@@ -12,11 +12,12 @@
 //!
 //! With dry friction the cost has kinks where the order of sticks and slips changes. The search is therefore a ladder
 //! of strategies. If no damped step helps (`damped.rs`) and the test is not passed, a bundle of exact gradients
-//! continues (`bundle.rs`), which detects a minimum on kinks. If there are no gradients, or they make no progress, the
-//! search has stalled.
+//! continues (`bundle.rs`), which detects a minimum on kinks. If there are no gradients, or they make no progress, an
+//! evolution strategy without gradients is tried (`evolved.rs`) before the search counts as stalled.
 
 use super::bundle::Bundle;
 use super::damped::Damped;
+use super::evolved::Evolved;
 use super::point::{Ending, Minimum, Options, Point, Strategy};
 use super::rung::{Climb, Rung, Watch};
 use crate::fit::asked::residuals::{Bounds, Residuals};
@@ -59,7 +60,9 @@ pub(crate) fn resume(
 
 /// The strategies, the first one tried first; with the Jacobian at the start, if it is known.
 fn ladder(options: &Options, known: Option<DMatrix<f64>>) -> Vec<Box<dyn Rung>> {
-    vec![Box::new(Damped::new(options, known)), Box::new(Bundle::default())]
+    let mut rungs: Vec<Box<dyn Rung>> = vec![Box::new(Damped::new(options, known)), Box::new(Bundle::default())];
+    rungs.push(Box::new(Evolved { most: options.evolutions }));
+    rungs
 }
 
 /// Tries rung after rung until one of them ends the search, or none is left. If a rung lowers the cost, the previous
@@ -180,12 +183,25 @@ mod tests {
     }
 
     #[test]
+    fn evolution_needs_no_derivatives() {
+        let (end, found) = alone(&mut Evolved { most: 1 }, &START, false);
+        assert_eq!((end, found.evolved), (Climb::Lowered, 1));
+        assert!(found.cost < cost(&START) && (found.cost - 64.0).abs() < 1.0, "{found:?}");
+        let (bounds, options) = (Bounds::none(2), Options::default());
+        let mut at = Point::new(&mut Differenced, &START, &bounds, &options).unwrap();
+        at.best = found;
+        assert!(!Evolved { most: 1 }.applies(&at), "a second time");
+    }
+
+    #[test]
     fn the_result_says_which_strategy_ended_the_search() {
-        for (is_exact, strategy) in [(true, Strategy::Bundle), (false, Strategy::Damped)] {
+        for (is_exact, strategies) in
+            [(true, &[Strategy::Bundle] as &[Strategy]), (false, &[Strategy::Damped, Strategy::Evolution])]
+        {
             let (bounds, options) = (Bounds::none(2), Options::default());
             let toy = &mut Kinked { is_exact };
             let found = minimise(toy, &START, &bounds, &options, &mut |_, _| Flow::Continue);
-            assert_eq!(found.strategy, Some(strategy));
+            assert!(found.strategy.is_some_and(|own| strategies.contains(&own)), "{:?}", found.strategy);
         }
     }
 
@@ -258,11 +274,11 @@ mod tests {
     #[test]
     fn what_is_lowered_goes_on_from_the_rung_below() {
         use Climb::{Converged, Lowered, Passed};
-        use Strategy::{Bundle, Damped};
+        use Strategy::{Bundle, Damped, Evolution};
         let (bounds, options) = (Bounds::none(2), Options::default());
         let climbed = Rc::new(RefCell::new(Vec::new()));
-        let ended = |ends: [Vec<Climb>; 2]| {
-            let mut names = [Damped, Bundle].into_iter();
+        let ended = |ends: [Vec<Climb>; 3]| {
+            let mut names = [Damped, Bundle, Evolution].into_iter();
             let mut ladder = ends.map(|ends| {
                 let own = names.next().unwrap();
                 Box::new(RecordingRung { ends, own, climbed: climbed.clone() }) as Box<dyn Rung>
@@ -272,12 +288,12 @@ mod tests {
             let end = search(&mut ladder, &mut at, toy, &mut |_, _| Flow::Continue);
             (end, climbed.take())
         };
-        let (end, order) = ended([vec![Passed, Passed], vec![Lowered, Converged]]);
-        assert_eq!((end, order), ((Ending::Converged, Bundle), vec![Damped, Bundle, Damped, Bundle]));
         // The second one no longer applies when the first one passes again.
-        let (end, order) = ended([vec![Passed, Passed], vec![Lowered]]);
-        assert_eq!((end, order), ((Ending::Stalled, Damped), vec![Damped, Bundle, Damped]));
-        let (end, order) = ended([vec![Passed], vec![Passed]]);
-        assert_eq!((end, order), ((Ending::Stalled, Bundle), vec![Damped, Bundle]));
+        let (end, order) = ended([vec![Passed, Passed], vec![Lowered], vec![Lowered, Converged]]);
+        assert_eq!((end, order), ((Ending::Converged, Evolution), vec![Damped, Bundle, Damped, Evolution, Evolution]));
+        let (end, order) = ended([vec![Passed], vec![Passed], vec![Converged]]);
+        assert_eq!((end, order), ((Ending::Converged, Evolution), vec![Damped, Bundle, Evolution]));
+        let (end, order) = ended([vec![Passed], vec![Passed], vec![Passed]]);
+        assert_eq!((end, order), ((Ending::Stalled, Evolution), vec![Damped, Bundle, Evolution]));
     }
 }

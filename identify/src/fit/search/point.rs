@@ -18,13 +18,23 @@ pub struct Options {
     pub frugal: bool,
     /// True if differences become central in the last few steps.
     pub sharp: bool,
+    /// Largest number of uses of an evolution strategy.
+    pub evolutions: usize,
     /// Residuals up to this size count as rounding, and do not determine the accuracy of a step.
     pub rounding: f64,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { tolerance: 1e-3, iterations: 100, huber: f64::INFINITY, frugal: true, sharp: true, rounding: 0.0 }
+        Self {
+            tolerance: 1e-3,
+            iterations: 100,
+            huber: f64::INFINITY,
+            frugal: true,
+            sharp: true,
+            evolutions: 2,
+            rounding: 0.0,
+        }
     }
 }
 
@@ -64,6 +74,8 @@ pub enum Strategy {
     Damped,
     /// A bundle of gradients around a kink.
     Bundle,
+    /// An evolution strategy, which needs no derivatives.
+    Evolution,
 }
 
 /// Result of a search.
@@ -88,6 +100,8 @@ pub struct Minimum {
     pub strategy: Option<Strategy>,
     /// Number of gradients that balance there; more than one at a kink.
     pub pieces: usize,
+    /// Number of uses of an evolution strategy.
+    pub evolved: usize,
     /// Jacobians computed.
     pub iterations: usize,
     /// Trial points.
@@ -108,6 +122,7 @@ impl Minimum {
             ending: Ending::Failed,
             strategy: None,
             pieces: 1,
+            evolved: 0,
             iterations: 0,
             evaluations: 1,
         }

@@ -78,7 +78,7 @@ pub(crate) struct Effort {
 impl Effort {
     /// Effort of a fit for comparison: a further step would change it far less than models differ on held-out records.
     pub fn compared() -> Self {
-        let options = Options { tolerance: ROUGH_TOLERANCE, iterations: STEPS, ..Options::default() };
+        let options = Options { tolerance: ROUGH_TOLERANCE, iterations: STEPS, evolutions: 0, ..Options::default() };
         Self { options, is_straight: true, is_short: false }
     }
 
@@ -213,6 +213,7 @@ fn as_it_is(problem: &mut Problem) -> Minimum {
         ending: if good { Ending::Converged } else { Ending::Failed },
         strategy: None,
         pieces: 1,
+        evolved: 0,
         iterations: 0,
         evaluations: 1,
     }
@@ -384,7 +385,7 @@ fn by_beginnings(
 
 /// A few steps of a rough search.
 fn rough() -> Options {
-    Options { iterations: TRIAL_ITERATIONS, tolerance: ROUGH_TOLERANCE, ..Options::default() }
+    Options { iterations: TRIAL_ITERATIONS, tolerance: ROUGH_TOLERANCE, evolutions: 0, ..Options::default() }
 }
 
 /// Updates the shared variables of `guess` by a rough search of another problem, which begins at it, and returns the

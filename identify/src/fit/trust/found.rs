@@ -62,6 +62,8 @@ pub struct Fit {
     pub starts: Vec<f64>,
     /// Number of gradients around the estimates that balance; more than one at a kink.
     pub pieces: usize,
+    /// Number of uses of an evolution strategy.
+    pub evolved: usize,
     /// Number of counted values.
     pub values: usize,
     /// Number of variables, including nuisance parameters.

@@ -109,7 +109,7 @@ pub(crate) fn search_near<'a>(
     let huber = if plan.huber { HUBER } else { f64::INFINITY };
     let pull = if is_far { Pull::FAR } else { Pull::WHOLE };
     let iterations = pull.iterations;
-    let options = Options { huber, rounding: problem.rounding(), iterations, ..whole };
+    let options = Options { huber, rounding: problem.rounding(), iterations, evolutions: 0, ..whole };
     let mut seen = None;
     if best.ending != Ending::Interrupted {
         let given = problem.point_of(given);

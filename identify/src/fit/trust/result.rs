@@ -128,6 +128,7 @@ pub(crate) fn result(found: &Searched, judged: Option<&Judged>) -> Fit {
         cost: best.cost,
         starts: starts.clone(),
         pieces: best.pieces,
+        evolved: best.evolved,
         values: problem.counted(),
         variables: problem.variables(),
         work: *work,

@@ -277,6 +277,7 @@ fn descend(problem: &mut Problem, plan: &Plan, start: &[f64], iterations: usize)
         iterations,
         tolerance: ROUGH_TOLERANCE,
         huber: huber(plan),
+        evolutions: 0,
         rounding: problem.rounding(),
         ..Options::default()
     };

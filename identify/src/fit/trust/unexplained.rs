@@ -62,6 +62,7 @@ fn windows(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity) -> Op
         let options = Options {
             iterations: TRIAL_FIT_ITERATIONS,
             tolerance: REFIT_TOLERANCE,
+            evolutions: 0,
             rounding: problem.rounding(),
             ..Options::default()
         };

@@ -435,8 +435,13 @@ impl<'a> Tried<'a> {
 
 /// The end of a short search that continues from a point. It ends early where it creeps above the cost `goal`.
 fn descend(problem: &mut Problem, from: Minimum, iterations: usize, goal: f64) -> Option<Minimum> {
-    let options =
-        Options { iterations, tolerance: ROUGH_TOLERANCE, rounding: problem.rounding(), ..Options::default() };
+    let options = Options {
+        iterations,
+        tolerance: ROUGH_TOLERANCE,
+        evolutions: 0,
+        rounding: problem.rounding(),
+        ..Options::default()
+    };
     let bounds = problem.bounds();
     let mut costs = Vec::new();
     let mut watch = |_: &[f64], cost: f64| {
