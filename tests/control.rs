@@ -632,6 +632,9 @@ fn gains_for_drives_make_the_same_command() {
     assert!((torque - machine.drives[0].motor.torque_constant * current).abs() < 1e-12, "{torque} {current}");
     let inertia = value("P-AXIS-00391 load") - value("3140:07 load inertia");
     assert_eq!(inertia, machine.drives[0].motor.rotor_inertia);
+    // The command of a stepper is a position.
+    let stepper = Case::read("stages/stepper-axis/stepper-axis.toml").unwrap().machine;
+    assert!(taut::control::drives::drive_gains(&stepper).is_empty());
 }
 
 /// The limit of a current loop bounds what a machine can follow, as that of the amplifier does.

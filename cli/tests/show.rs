@@ -55,6 +55,19 @@ fn the_papers_machine_as_one_computes_it_by_hand() {
     assert_eq!(shown["depends_on_place"], false);
 }
 
+/// The breakaway had the force along the travel, the largest acceleration and speed had not.
+#[test]
+fn a_force_along_the_travel_acts_as_a_load() {
+    let along = "cart.force_along=[[\"-0.1 m\", \"0.5 N\"], [\"0 m\", \"0.5 N\"], [\"0.1 m\", \"0.5 N\"]]";
+    let [along, load] = [along, "cart.load=0.5 N"].map(|change| shown(&[TABLE4, "--set", change]));
+    for row in ["largest_acceleration", "largest_speed", "breakaway_input"] {
+        for key in [row.to_string(), format!("{row}_backward")] {
+            near(value(&along, &key), value(&load, &key));
+            assert_ne!(value(&along, &key), value(&shown(&[TABLE4]), row));
+        }
+    }
+}
+
 /// Frequencies and damping are those of `taut modes`.
 #[test]
 fn frequencies_are_those_of_the_modes() {

@@ -131,6 +131,12 @@ impl Machine {
         self.slide(number).map_or(0.0, |slide| slide.constant_force_with(self.sliding_mass(number)))
     }
 
+    /// Force on the slide of this number that does not depend on its speed, N, at `position` (m).
+    pub fn force_at(&self, number: usize, position: f64) -> f64 {
+        let along = self.slide(number).and_then(|slide| slide.forces.along.as_ref());
+        self.constant_force(number) + along.map_or(0.0, |line| line.value(position))
+    }
+
     /// Breakaway force at the belt, N, of the slide of this number at `position` (m) with everything that turns with
     /// it; the sign of `side` is the direction.
     pub fn breakaway(&self, number: usize, side: f64, position: f64) -> f64 {
@@ -139,10 +145,9 @@ impl Machine {
         let drives = self.movers(number).map(|(_, sign)| self.drive_pulley.friction.side(forward(sign)).breakaway);
         let pulleys = drives.sum::<f64>() + self.idler_pulley.friction.side(forward(1.0)).breakaway;
         let along = slide.along.as_ref().map_or(1.0, |along| along.value(position));
-        let lines = [(&slide.forces.along, position), (&slide.forces.by_speed, 0.0)];
-        let of_lines = lines.iter().filter_map(|(line, at)| Some(line.as_ref()?.value(*at))).sum::<f64>();
+        let by_speed = slide.forces.by_speed.as_ref().map_or(0.0, |line| line.value(0.0));
         let own = along * slide.friction.side(forward(1.0)).breakaway;
-        own + pulleys / self.pulley_radius - side * (self.constant_force(number) + of_lines)
+        own + pulleys / self.pulley_radius - side * (self.force_at(number, position) + by_speed)
     }
 
     /// The sliding parts, in the order of the geometry: the bridge, if any, then the cart.

@@ -49,7 +49,11 @@ fn one(found: &ShaperFile) -> Value {
         })),
         "criterion": {
             "design_damping": criterion.damping,
-            "tested_dampings": criterion.tested,
+            "tested_dampings": match &found.source {
+                // Each mode has the damping of the model.
+                Source::Model { modes, .. } => modes.iter().map(|mode| mode.damping).collect(),
+                _ => criterion.tested.clone(),
+            },
             "corner_acceleration": criterion.corner.acceleration,
             "corner_speed": criterion.corner.speed,
             "motor_acceleration": criterion.motor_acceleration,

@@ -102,6 +102,6 @@ impl Direction {
 
     /// True if backward it moves otherwise than forward.
     pub fn is_one_sided(&self, machine: &Machine) -> bool {
-        machine.constant_force(self.number) != 0.0 || self.resistance(machine, 1.0) != self.resistance(machine, -1.0)
+        machine.force_at(self.number, 0.0) != 0.0 || self.resistance(machine, 1.0) != self.resistance(machine, -1.0)
     }
 }

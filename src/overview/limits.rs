@@ -69,7 +69,7 @@ fn reached(
 ) {
     let (end, words) = if side > 0.0 { ("", "") } else { ("_backward", " backward") };
     let Resistance { coulomb, viscous } = direction.resistance(machine, side);
-    let against = -side * machine.constant_force(direction.number);
+    let against = -side * machine.force_at(direction.number, 0.0);
     let force = together.force(0.0);
     let left = (force - coulomb - against) / direction.accelerated();
     let name = format!("{}{words}", direction.words("largest acceleration"));

@@ -66,7 +66,11 @@ pub fn comparison(tried: &[Tried]) -> String {
             });
             row.push(format!("{:.2} A", figures.drive().current.1));
             if !amperes {
-                row.push(format!("{:.2} V", figures.drive().voltage.1));
+                // Each phase of a stepper has a voltage of its own.
+                row.push(match case.case.machine.stepper() {
+                    Some(_) => "–".into(),
+                    None => format!("{:.2} V", figures.drive().voltage.1),
+                });
             }
             if let Some(worst) = &done.worst {
                 row.extend([length(worst.error), format!("{}/{}", worst.settled, worst.axes)]);

@@ -84,8 +84,9 @@ fn remark(planned: &Planned) -> Option<Remark> {
         )));
     }
     if arrival.saturated > 0.0 {
-        return Some(Remark::Warning(format!(
-            "the move \"{name}\" saturates for {}, though its reference needs less: feed-forward, or a larger --reserve",
+        return Some(Remark::Note(format!(
+            "the move \"{name}\" saturates for {}, though its reference needs less: feed-forward or a larger --reserve \
+             avoids it",
             time(arrival.saturated)
         )));
     }

@@ -395,7 +395,8 @@ impl Machine {
             let terms: Vec<(usize, f64)> = slides.chain([(drive.pulley, -self.pulley_radius)]).collect();
             let weights = arms.solve(&form(&terms), 1e-9 * arms.singular_values.max()).unwrap_or_default();
             // Of spans they are simple fractions, here without their rounding.
-            let simple = |w: f64| if (64.0 * w - (64.0 * w).round()).abs() < 1e-9 { (64.0 * w).round() / 64.0 } else { w };
+            let simple =
+                |w: f64| if (64.0 * w - (64.0 * w).round()).abs() < 1e-9 { (64.0 * w).round() / 64.0 } else { w };
             springs.iter().copied().zip(weights.iter().map(|w| simple(*w))).collect()
         };
         geometry.drives.iter().zip(self.belt_shares()).map(of_drive).collect()
