@@ -19,9 +19,6 @@ fn a_plan_is_written_and_moves() {
     assert_eq!((output.status.code(), &told["schema"]), (Some(0), &"taut/plan/1".into()));
     let one = &told["moves"][0];
     assert!(one["arrival"]["in_window_s"].as_f64() > one["fastest_rigid_s"].as_f64(), "{one}");
-    // Without feed-forward its loop saturates for a moment.
-    let note = String::from_utf8_lossy(&output.stderr);
-    assert!(one["arrival"]["saturated_s"].as_f64() > Some(0.0) && note.contains("saturates for"), "{one} {note}");
     // The case that was written moves as was told.
     let moved = taut(&["move", planned, "--move", "long", "--json"]);
     let moved: Value = serde_json::from_slice(&moved.stdout).unwrap();
@@ -40,6 +37,15 @@ fn a_plan_is_written_and_moves() {
     for name in ["planned.toml", "plan.json", "report.html", "files.json"] {
         assert!(out.join(name).is_file(), "{name}");
     }
+    // For one machine it is quicker, and the loop without feed-forward saturates for a moment: `move` warns of it, too.
+    let told: Value = serde_json::from_slice(&fs::read(out.join("plan.json")).unwrap()).unwrap();
+    let note = String::from_utf8_lossy(&done.stderr);
+    assert!(
+        told["moves"][0]["arrival"]["saturated_s"].as_f64() > Some(0.0) && note.contains("saturates for"),
+        "{note}"
+    );
+    let moved = taut(&["move", out.join("planned.toml").to_str().unwrap(), "--move", "long"]);
+    assert!(String::from_utf8_lossy(&moved.stderr).contains("saturates"), "{moved:?}");
 }
 
 #[test]
