@@ -193,9 +193,9 @@ impl SpanGauge {
 }
 
 impl DriveGauge {
-    fn new(machine: &Machine, mechanism: &Mechanism, drive: usize) -> Self {
+    /// Of the drive of this number; `elongations` are springs and weights.
+    fn new(machine: &Machine, mechanism: &Mechanism, (drive, elongations): (usize, Vec<(usize, f64)>)) -> Self {
         let find = |shown: Shown| mechanism.readings.iter().position(|reading| *reading == shown);
-        let elongations = machine.elongations_of_drives(mechanism).swap_remove(drive);
         let mechanisms_drive = &mechanism.drives[drive];
         let motor = &mechanisms_drive.motor;
         Self {
@@ -262,12 +262,13 @@ impl<'a> Gauge<'a> {
     pub(super) fn new(machine: &Machine, experiment: &Experiment, profiles: &'a [Profile], window: f64) -> Self {
         let (_, mechanism) = read(machine);
         let loads = machine.geometry().slides.iter().zip(profiles);
+        let drives = machine.elongations_of_drives(&mechanism).into_iter().enumerate();
         Self {
             meter: Meter::with(machine, &Sought::all(machine, &mechanism), Held::last(experiment), &experiment.inputs),
             profiles,
             window,
             loads: loads.map(|load| LoadGauge::new(load, &mechanism)).collect(),
-            drives: (0..machine.drives.len()).map(|drive| DriveGauge::new(machine, &mechanism, drive)).collect(),
+            drives: drives.map(|drive| DriveGauge::new(machine, &mechanism, drive)).collect(),
             spans: SpanGauge::from_machine(machine, &mechanism),
             contour: Contour::along(profiles).map(ContourGauge::new),
             end: 0.0,

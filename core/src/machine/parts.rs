@@ -374,8 +374,8 @@ impl Machine {
         geometry.drives.iter().map(|drive| geometry.bodies[drive.pulley].by_slides).collect()
     }
 
-    /// Position of each drive's part of the belt by the slides minus r φ of its pulley as a sum over elongations d = A q:
-    /// springs and their weights w.
+    /// Position of each drive's part of the belt by the slides minus r φ of its pulley as a sum over elongations
+    /// d = A q: springs and their weights w.
     ///
     /// ```text
     /// Σ s x − r φ = Σ w d
