@@ -3,7 +3,7 @@
 use crate::common::chance;
 use crate::common::logged;
 use chance::Chance;
-use logged::{logged, of_loop};
+use logged::{fitted_in_steps, logged, of_loop};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 use taut::case::{Case, Nuisances, Plan, Scope, TEMPLATE};
@@ -246,7 +246,7 @@ fn a_delay_is_found_in_windows_as_in_the_whole_log() {
     let nuisance = Nuisances { delay: Scope::Shared, ..Nuisances::default() };
     for windows in [None, Some(0.3), Some(0.1)] {
         let plan = Plan { nuisance, windows, ..plan(&["cart.friction.viscous", "cart.mass"]) };
-        let found = fit(&case, &plan, None, &mut |_| Flow::Continue).unwrap();
+        let found = fitted_in_steps(&case, &plan, None).unwrap();
         for (estimate, truth) in found.estimates.iter().zip([24.0, 0.5, 9e-3]) {
             let (value, error) = (estimate.value, estimate.error.unwrap());
             assert!(

@@ -3,11 +3,12 @@
 
 use crate::common::chance::Chance;
 use crate::common::gantries::{COUNT, Drawn, Lacks, drawn as lacking, stage};
+use crate::common::logged::fitted_in_steps;
 use std::sync::Arc;
 use taut::case::{Case, Plan};
 use taut::fit::compare::{ComparisonOptions, FrictionLaw, compare};
 use taut::fit::least_squares::{Differences, Residuals};
-use taut::fit::{Fit, Problem, check, drift, fit};
+use taut::fit::{Fit, Problem, check, drift};
 use taut::log::{Log, Output, Quantity};
 use taut::machine::{Machine, MachineKind};
 use taut::signal::Hold;
@@ -76,7 +77,7 @@ fn with_log(mut case: Case, truth: &Case, positions: Option<f64>, seed: u64) -> 
 }
 
 fn fitted(case: &Case, plan: &Plan) -> Fit {
-    fit(case, plan, None, &mut |_| Flow::Continue).unwrap()
+    fitted_in_steps(case, plan, None).unwrap()
 }
 
 /// The two spans of each belt of a CoreXY show by their sum only.

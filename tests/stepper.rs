@@ -2,6 +2,7 @@
 //! a microsecond, which shares nothing with the solvers. Also limit laws that hold by hand.
 
 use crate::common::chance::Chance;
+use crate::common::logged::fitted_in_steps;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use taut::case::{Case, Move};
@@ -1036,7 +1037,7 @@ fn fitted_with(name: &str, scale: &str) -> (taut::Result<Fit>, usize) {
         simulations.fetch_add(1, Relaxed);
         false
     };
-    let found = fit(&case, &plan, Some(&stop), &mut |_| Flow::Continue);
+    let found = fitted_in_steps(&case, &plan, Some(&stop));
     std::fs::remove_dir_all(&folder).unwrap();
     (found, simulations.into_inner())
 }

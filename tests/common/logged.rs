@@ -1,9 +1,10 @@
 //! Runs as logs.
 
 use std::sync::Arc;
-use taut::case::{Case, Move};
+use taut::case::{Case, Move, Plan};
 use taut::control::{Loop, Rows, Sample, Standard, each, stream};
 use taut::error::{Error, Result};
+use taut::fit::{Fit, Problem, Stop, fit_watched};
 use taut::log::{Log, Output, Quantity};
 use taut::machine::Machine;
 use taut::plan::Experiment;
@@ -29,6 +30,24 @@ pub fn columns(name: &str, time: Vec<f64>, input: Vec<f64>, outputs: Vec<Output>
 /// The values of a sensor.
 pub fn output(quantity: Quantity, values: Vec<f64>) -> Output {
     Output { quantity, absolute: false, values }
+}
+
+/// A fit each step of which is a point of the problem: steps in windows, in beginnings of the logs and with held delays
+/// were those of other problems, and a studio that drew them stopped.
+pub fn fitted_in_steps(case: &Case, plan: &Plan, stop: Option<Stop>) -> Result<Fit> {
+    let problem = Problem::new(case, plan)?;
+    let bounds = problem.bounds();
+    let (low, high) = (&bounds.low, &bounds.high);
+    let mut steps = 0;
+    let found = fit_watched(case, plan, stop, &mut |x, _| {
+        steps += 1;
+        assert_eq!(x.len(), problem.variables(), "step {steps}");
+        let is_within = x.iter().zip(low.iter().zip(high)).all(|(x, (low, high))| (low..=high).contains(&x));
+        assert!(is_within, "step {steps}: {x:?} of {low:?} to {high:?}");
+        Flow::Continue
+    });
+    assert!(steps > 0 || found.is_err());
+    found
 }
 
 /// The log of a run that shows these angles of the drive pulley.

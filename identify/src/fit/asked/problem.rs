@@ -370,15 +370,19 @@ impl<'a> Problem<'a> {
         self.parameters.len() + self.shared.len()
     }
 
-    /// Sets the variables of `x` that concern all runs to those of a point of another problem, which may share less.
-    pub(crate) fn take_globals(&self, x: &mut [f64], other: &Problem, theirs: &[f64]) {
+    /// Indices of the variables that concern all runs, here and in another problem, which may share less.
+    pub(crate) fn globals_in(&self, other: &Problem) -> Vec<(usize, usize)> {
         let parameters = self.parameters.len();
-        x[..parameters].copy_from_slice(&theirs[..parameters]);
-        for (k, extra) in self.shared.iter().enumerate() {
-            if let Some(j) = other.shared.iter().position(|own| own.what == extra.what) {
-                x[parameters + k] = theirs[parameters + j];
-            }
-        }
+        let shared = self.shared.iter().enumerate().filter_map(|(k, extra)| {
+            let theirs = other.shared.iter().position(|own| own.what == extra.what)?;
+            Some((parameters + k, parameters + theirs))
+        });
+        (0..parameters).map(|j| (j, j)).chain(shared).collect()
+    }
+
+    /// Sets the variables of `x` that concern all runs to those of a point of another problem.
+    pub(crate) fn take_globals(&self, x: &mut [f64], other: &Problem, theirs: &[f64]) {
+        self.globals_in(other).into_iter().for_each(|(own, other)| x[own] = theirs[other]);
     }
 
     /// Indices of the variables that are delays.

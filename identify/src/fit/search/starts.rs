@@ -3,6 +3,7 @@
 use super::least_squares::minimise;
 use super::point::{Ending, Minimum, Options};
 use super::regression::regression;
+use super::rung::Watch;
 use super::triangle::inverse_of_square;
 use crate::case::{Case, Nuisances, Plan, Scope};
 use crate::chance;
@@ -95,30 +96,19 @@ pub(crate) fn search_as_far<'a>(
     plan: &Plan,
     stop: Option<Stop<'a>>,
     effort: &Effort,
-    watch: &mut dyn FnMut(&[f64], f64) -> Flow,
+    watch: &mut Watch,
 ) -> Result<Searched<'a>> {
     let whole = effort.options;
     let mut problem = Problem::new(case, plan)?.stopped_by(stop).straight(effort.is_straight);
-    let mut work = Work::default();
-    let mut descend = |problem: &mut Problem, x: &[f64], options: &Options| {
-        let options = Options { rounding: problem.rounding(), ..*options };
-        let bounds = problem.bounds();
-        if x.is_empty() {
-            return as_it_is(problem);
-        }
-        let minimum = minimise(problem, x, &bounds, &options, &mut *watch);
-        work.iterations += minimum.iterations;
-        work.evaluations += minimum.evaluations;
-        minimum
-    };
+    let mut search = Search { watch, work: Work::default() };
     let (start, other) = match effort.is_short && !problem.machine.has_torque_balance() {
         // It begins at the result for all logs.
         true => (problem.start(), None),
-        false => first_guess(case, plan, &mut problem, &mut descend)?,
+        false => first_guess(case, plan, &mut problem, &mut search)?,
     };
-    let mut best = descend(&mut problem, &start, &whole);
+    let mut best = search.descend(&mut problem, &start, &whole);
     if let Some(other) = other.filter(|_| times_noise(&problem, &best) > FAR_BEYOND_NOISE) {
-        let trial = descend(&mut problem, &other, &whole);
+        let trial = search.descend(&mut problem, &other, &whole);
         if trial.ending != Ending::Failed && trial.cost < best.cost {
             best = trial;
         }
@@ -143,14 +133,14 @@ pub(crate) fn search_as_far<'a>(
             break;
         }
         let x = elsewhere(&problem, &mut random);
-        let trial = descend(
+        let trial = search.descend(
             &mut problem,
             &x,
             &Options { iterations: TRIAL_ITERATIONS, tolerance: whole.tolerance.max(ROUGH_TOLERANCE), ..whole },
         );
         let near = trial.cost < 1.2 * best.cost;
         let trial =
-            if near && trial.ending != Ending::Failed { descend(&mut problem, &trial.x, &whole) } else { trial };
+            if near && trial.ending != Ending::Failed { search.descend(&mut problem, &trial.x, &whole) } else { trial };
         starts.push(trial.cost);
         if trial.cost < best.cost {
             best = trial;
@@ -187,7 +177,7 @@ pub(crate) fn search_as_far<'a>(
                 break;
             }
         }
-        best = descend(&mut problem, &best.x.clone(), &options);
+        best = search.descend(&mut problem, &best.x.clone(), &options);
     }
     if problem.is_stopped() {
         best.ending = Ending::Interrupted;
@@ -195,7 +185,7 @@ pub(crate) fn search_as_far<'a>(
     if noise.is_empty() {
         noise = noise_of(&problem, &best, plan.huber);
     }
-    work.simulations = problem.simulations;
+    let work = Work { simulations: problem.simulations, ..search.work };
     Ok(Searched { problem, best, noise, starts, work })
 }
 
@@ -283,8 +273,45 @@ fn told_beforehand(problem: &Problem, noise: &[(Quantity, f64)]) -> bool {
     problem.runs.iter().flat_map(|run| &run.extras).any(|extra| extra.known.is_some_and(|own| own > 0.1 * arm * most))
 }
 
-/// A search of a problem from a point.
-type Descend<'d> = dyn FnMut(&mut Problem, &[f64], &Options) -> Minimum + 'd;
+/// Searches from points, watched at each step.
+struct Search<'w> {
+    watch: &'w mut dyn FnMut(&[f64], f64) -> Flow,
+    work: Work,
+}
+
+impl Search<'_> {
+    fn descend(&mut self, problem: &mut Problem, x: &[f64], options: &Options) -> Minimum {
+        Self::count(&mut self.work, problem, x, options, self.watch)
+    }
+
+    /// Searches another problem than the one that was asked, which is at `at`; its steps are shown as points of that.
+    fn descend_in(
+        &mut self,
+        other: &mut Problem,
+        x: &[f64],
+        options: &Options,
+        asked: &Problem,
+        at: &[f64],
+    ) -> Minimum {
+        let (globals, mut at) = (asked.globals_in(other), at.to_vec());
+        Self::count(&mut self.work, other, x, options, &mut |x, cost| {
+            globals.iter().for_each(|&(own, theirs)| at[own] = x[theirs]);
+            (self.watch)(&at, cost)
+        })
+    }
+
+    fn count(work: &mut Work, problem: &mut Problem, x: &[f64], options: &Options, watch: &mut Watch) -> Minimum {
+        if x.is_empty() {
+            return as_it_is(problem);
+        }
+        let options = Options { rounding: problem.rounding(), ..*options };
+        let bounds = problem.bounds();
+        let minimum = minimise(problem, x, &bounds, &options, watch);
+        work.iterations += minimum.iterations;
+        work.evaluations += minimum.evaluations;
+        minimum
+    }
+}
 
 /// Start values of the case or of a regression, with delays after fits that hold them; for a stepper, of fits to the
 /// beginnings of its logs; for several coordinates, of fits in short windows: whichever fits the logs better. Beside
@@ -293,20 +320,20 @@ fn first_guess(
     case: &Case,
     plan: &Plan,
     problem: &mut Problem,
-    descend: &mut Descend,
+    search: &mut Search,
 ) -> Result<(Vec<f64>, Option<Vec<f64>>)> {
     let start = problem.start();
     let guess = match &problem.machine {
         machine if machine.has_torque_balance() => by_regression(problem, &start),
-        machine if machine.stepper().is_some() => Some(by_beginnings(case, plan, problem, &start, descend)?),
-        _ => in_windows(case, plan, problem, &start, descend)?,
+        machine if machine.stepper().is_some() => Some(by_beginnings(case, plan, problem, &start, search)?),
+        _ => in_windows(case, plan, problem, &start, search)?,
     };
     let guess = match guess {
         Some(guess) => better(problem, start, guess),
         None => start,
     };
     match problem.machine.has_torque_balance() && plan.nuisance.delay != Scope::Off {
-        true => Ok((with_delays(case, plan, problem, guess.clone(), descend)?, Some(guess))),
+        true => Ok((with_delays(case, plan, problem, guess.clone(), search)?, Some(guess))),
         false => Ok((guess, None)),
     }
 }
@@ -330,7 +357,7 @@ fn with_delays(
     plan: &Plan,
     problem: &mut Problem,
     start: Vec<f64>,
-    descend: &mut Descend,
+    search: &mut Search,
 ) -> Result<Vec<f64>> {
     let undelayed = Plan { nuisance: Nuisances { delay: Scope::Off, ..plan.nuisance }, ..plan.clone() };
     let undelayed = Problem::new(case, &undelayed)?.stopped_by(problem.stop()).straight(problem.is_straight);
@@ -338,7 +365,7 @@ fn with_delays(
     let mut fitted = |intervals: f64, problem: &mut Problem, from: &[f64]| {
         let (mut other, mut x) = (undelayed.clone(), from.to_vec());
         other.runs.iter_mut().for_each(|run| run.delay_inputs(intervals * interval));
-        improve(other, problem, &mut x, descend).map(|cost| (cost, intervals, x))
+        improve(other, problem, &mut x, search).map(|cost| (cost, intervals, x))
     };
     let both = [0.5, -0.5].map(|intervals| fitted(intervals, problem, &start));
     let first = both.into_iter().flatten().min_by(|a, b| a.0.total_cmp(&b.0));
@@ -366,7 +393,7 @@ fn by_beginnings(
     plan: &Plan,
     problem: &mut Problem,
     start: &[f64],
-    descend: &mut Descend,
+    search: &mut Search,
 ) -> Result<Vec<f64>> {
     let (plan, mut guess) = (Plan { until: None, ..plan.clone() }, start.to_vec());
     let end = problem.runs.iter().map(FittedLog::length).fold(0.0, f64::max);
@@ -375,7 +402,7 @@ fn by_beginnings(
     let first = (FIRST_BEGINNING / slowest).max(end * SHORTEST_BEGINNING);
     for length in std::iter::successors(Some(first), |length| Some(2.0 * length)).take_while(|length| *length < end) {
         let other = Problem::new(&beginning(case, length), &plan)?.stopped_by(problem.stop());
-        improve(other, problem, &mut guess, descend);
+        improve(other, problem, &mut guess, search);
         if problem.is_stopped() {
             break;
         }
@@ -390,10 +417,10 @@ fn rough() -> Options {
 
 /// Updates the shared variables of `guess` by a rough search of another problem, which begins at it, and returns the
 /// cost; none, without changes, if that fails.
-fn improve(mut other: Problem, problem: &mut Problem, guess: &mut [f64], descend: &mut Descend) -> Option<f64> {
+fn improve(mut other: Problem, problem: &mut Problem, guess: &mut [f64], search: &mut Search) -> Option<f64> {
     let mut first = other.start();
     other.take_globals(&mut first, problem, guess);
-    let found = descend(&mut other, &first, &rough());
+    let found = search.descend_in(&mut other, &first, &rough(), problem, guess);
     problem.simulations += other.simulations;
     if found.ending == Ending::Failed {
         return None;
@@ -440,7 +467,7 @@ fn in_windows(
     plan: &Plan,
     problem: &mut Problem,
     start: &[f64],
-    descend: &mut Descend,
+    search: &mut Search,
 ) -> Result<Option<Vec<f64>>> {
     let globals = problem.globals();
     if plan.windows.is_some() || plan.closed_loop || globals == 0 {
@@ -450,11 +477,11 @@ fn in_windows(
     for length in std::iter::once(None).chain(START_WINDOWS.map(Some)) {
         if let Some(length) = length {
             let other = Problem::new(case, &windowed(plan, problem, length))?.stopped_by(problem.stop());
-            if improve(other, problem, &mut guess, descend).is_none() {
+            if improve(other, problem, &mut guess, search).is_none() {
                 break;
             }
         }
-        let found = descend(problem, &guess, &rough());
+        let found = search.descend(problem, &guess, &rough());
         // Two starts that lead to one minimum indicate that no other is near.
         let agrees = best.as_ref().is_some_and(|best: &Minimum| (found.cost / best.cost - 1.0).abs() < SAME_MINIMUM);
         let is_better = best.as_ref().is_none_or(|best: &Minimum| found.cost < best.cost);
@@ -489,20 +516,14 @@ pub(crate) fn end_in_windows<'a>(
     let [short, plan, _] = START_WINDOWS.map(|samples| windowed(plan, problem, samples));
     let (mut guess, globals) = (start.to_vec(), problem.globals());
     let other = Problem::new(case, &short).ok()?.stopped_by(problem.stop());
-    improve(other, &mut problem.clone(), &mut guess, &mut roughly)?;
+    let mut search = Search { watch: &mut |_, _| Flow::Continue, work: Work::default() };
+    improve(other, &mut problem.clone(), &mut guess, &mut search)?;
     let mut problem = Problem::new(case, &plan).ok()?.stopped_by(problem.stop());
     let mut start = problem.start();
     start[..globals].copy_from_slice(&guess[..globals]);
-    let found = roughly(&mut problem, &start, &rough());
+    let found = search.descend(&mut problem, &start, &rough());
     let noise = noise_of(&problem, &found, false);
     (found.ending != Ending::Failed).then_some(InWindows { plan, problem, x: found.x, noise })
-}
-
-/// A search whose steps nobody watches.
-fn roughly(problem: &mut Problem, x: &[f64], options: &Options) -> Minimum {
-    let options = Options { rounding: problem.rounding(), ..*options };
-    let bounds = problem.bounds();
-    minimise(problem, x, &bounds, &options, &mut |_, _| Flow::Continue)
 }
 
 /// The plan in windows of so many samples, but no more windows than [`MOST_START_WINDOWS`].
