@@ -1,5 +1,6 @@
 //! The figures of moves in closed loop, against dense quadratures, and whatever their rows.
 
+use crate::common::chance::Chance;
 use taut::case::{Case, Move};
 use taut::control::{Accuracy, Loop, MoveRun, Rows, Standard, each, stream};
 use taut::solve::{Ending, Flow, PositionError, Solver};
@@ -213,6 +214,78 @@ fn a_move_states_by_how_much_it_may_be_off() {
             assert!(error.way > 0.01 && error.value < 1e-3 * error.way, "{name} {changes:?} {solver:?}: {error:?}");
         }
     }
+}
+
+/// An axis with play in its gear, flanks without damping and an encoder at the motor.
+const RATTLING: &str = r#"
+[motor]
+torque_constant = 0.05
+back_emf_constant = 0.05
+resistance = 1
+rotor_inertia = 2.7e-6
+gear_stiffness = 348
+gear_efficiency = 0.83
+backlash = 3e-3
+[drive_pulley]
+radius = 0.01
+inertia = 1e-5
+friction = { coulomb = 0.01 }
+[idler_pulley]
+inertia = 1e-5
+[cart]
+mass = 0.33
+friction = { viscous = 5, coulomb = 0.47 }
+[belt]
+stiffness = [1e5, 1e5, 5e4]
+damping = [20, 20, 10]
+[encoder]
+at = "motor"
+lines = 256
+[controller]
+every = 0.5e-3
+delay = 0.25e-3
+limit = 24
+cascade = { position = 40, speed = 30, speed_integral = 500 }
+[[move]]
+name = "there"
+to = 0.04
+speed = 0.3
+acceleration = 3
+until = 0.6
+"#;
+
+/// Flanks that rattle between counts of the encoder amplify rounding until the bound for given inputs is kilometres; the
+/// cart is off by micrometres, but was called not determined.
+#[test]
+fn a_loop_that_rattles_states_by_how_much_its_cart_may_be_off() {
+    let mut chance = Chance::new(7);
+    let mut chaotic = 0;
+    for _ in 0..12 {
+        let changes = [
+            ("motor.gear_efficiency", chance.scaled(0.7, 1.0)),
+            ("motor.gear_stiffness", chance.scaled(50.0, 1000.0)),
+            ("motor.rotor_inertia", chance.scaled(1e-6, 1e-5)),
+            ("motor.backlash", chance.scaled(1e-3, 1e-2)),
+            ("cart.mass", chance.scaled(0.3, 1.5)),
+        ];
+        let read = |of_mass: f64| {
+            let factor = |key: &str| if key == "cart.mass" { of_mass } else { 1.0 };
+            let changes = changes.map(|(key, value)| format!("{key}={:?}", value * factor(key)));
+            Case::from_text_with("rattling.toml", RATTLING, &changes.each_ref().map(String::as_str)).unwrap()
+        };
+        let case = read(1.0);
+        assert!(case.machine.rattles());
+        let (cart, error) = stated(&case, Solver::Exact);
+        chaotic += usize::from(error.value > 1e-6);
+        assert!(!error.is_undetermined(), "{changes:?}: {error:?}");
+        for of_mass in [4e-15, -4e-15, 1e-14] {
+            let (other, _) = stated(&read(1.0 + of_mass), Solver::Exact);
+            let off = cart.iter().zip(&other).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(off <= error.value, "{changes:?}: {off:e} m, {error:?}");
+        }
+    }
+    println!("{chaotic} of 12 amplify rounding");
+    assert!(chaotic >= 3, "{chaotic}");
 }
 
 /// Rounding of an unstable loop grows as the loop does: its positions are not determined.

@@ -15,6 +15,7 @@ use taut::control::{Accuracy, Added, Controller, Loop, MoveRun, Rows, Standard, 
 use taut::design::Design;
 use taut::files::write_atomically;
 use taut::json::{self, Moved};
+use taut::machine::Machine;
 use taut::reach::feasible::sentence;
 use taut::reach::pull_out::short_supply;
 use taut::solve::{Flow, Solver};
@@ -219,13 +220,15 @@ fn status(tried: &[Tried], interrupt: &Interrupt) -> (Status, Vec<Remark>) {
         let saturated = saturated(done).filter(|_| done.trouble.is_none())?;
         Some(Remark::Warning(format!("the move \"{name}\" saturates, though its reference needs less: {saturated}")))
     };
-    let unsure = |done: &Done| {
+    let unsure = |machine: &Machine, done: &Done| {
         let plain = done.trouble.is_none() && ended_early(&done.run.outcome.ending, "cart").is_none();
-        hidden("move", &done.motion.name, &done.run.outcome).filter(|_| plain).map(Remark::Warning)
+        hidden("move", &done.motion.name, machine, &done.run.outcome).filter(|_| plain).map(Remark::Warning)
     };
-    let all = || tried.iter().flat_map(|tried| &tried.done);
-    let remarks: Vec<Remark> =
-        all().flat_map(|done| [early(done), beyond(done), unwell(done), unsure(done)]).flatten().collect();
+    let all = || tried.iter().flat_map(|tried| tried.done.iter().map(|done| (&tried.case.machine, done)));
+    let remarks: Vec<Remark> = all()
+        .flat_map(|(machine, done)| [early(done), beyond(done), unwell(done), unsure(machine, done)])
+        .flatten()
+        .collect();
     let status = match interrupt.signal() {
         Some(signal) => Status::Interrupted(signal),
         None if remarks.is_empty() => Status::Done,

@@ -121,7 +121,7 @@ fn simulate(args: &Simulate, path: &Path, case: &Case) -> Outcome {
             name: &run.experiment.name,
             outcome: &run.outcome,
             early: early_end(run, &case.machine),
-            doubt: hidden("run", &run.experiment.name, &run.outcome)
+            doubt: hidden("run", &run.experiment.name, &case.machine, &run.outcome)
                 .or_else(|| yawed(&run.experiment.name, &run.metrics)),
         })
         .collect();

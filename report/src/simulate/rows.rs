@@ -281,8 +281,8 @@ pub fn yawed(name: &str, metrics: &Metrics) -> Option<String> {
     ))
 }
 
-/// The word for a result of a "run" or a "move" that its error hides.
-pub fn hidden(what: &str, name: &str, outcome: &Outcome) -> Option<String> {
+/// The word for a result of a "run" or a "move" of this machine that its error hides.
+pub fn hidden(what: &str, name: &str, machine: &Machine, outcome: &Outcome) -> Option<String> {
     let error = outcome.error.filter(|error| error.hides_motion())?;
     // Errors that have grown beyond the motion itself are no lengths any more.
     let off = match error.is_undetermined() {
@@ -295,9 +295,11 @@ pub fn hidden(what: &str, name: &str, outcome: &Outcome) -> Option<String> {
             format!("positions of the {what} \"{name}\" may be wrong by {off}, and its motion is at most {way}")
         }
     };
-    Some(format!(
-        "{off}: this result is not to be relied on; shorten the run, or leave out what is so stiff or feeds the motion"
-    ))
+    let next = match machine.rattles() {
+        true => "the flanks of a gear without gear_damping rattle, which amplifies rounding: give it one",
+        false => "shorten the run, or leave out what is so stiff or feeds the motion",
+    };
+    Some(format!("{off}: this result is not to be relied on; {next}"))
 }
 
 /// Where the machines of --draws end.
