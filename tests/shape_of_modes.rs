@@ -1,8 +1,11 @@
 //! Input shapers from the modes of a machine, without a measurement: single ones, and pairs.
 
+use crate::common::chance::Chance;
 use taut::case::Case;
 use taut::control::shaper::{Firmware, Shaper, ShaperKind, residual_vibration};
 use taut::control::shaping::{Criterion, Target, choose};
+use taut::linear::{Operation, Root, System};
+use taut::machine::{Machine, MachineKind};
 use taut::reach::resonance::{Drive, Resonance, reaches, resonances};
 
 /// The shaper that is chosen for a stage leaves little of each of its modes, along all of its travel.
@@ -178,4 +181,71 @@ fn a_mode_that_moves_far_is_told_with_its_range() {
     let worst = modes.iter().map(|mode| mode.share * residual_vibration(&impulses, mode.frequency, mode.damping));
     assert!(worst.fold(0.0, f64::max) <= pair.vibration + 1e-12);
     assert!(pair.vibration < 0.05 && pair.smoothing > 0.0, "{pair:?} {:?}", choice.best());
+}
+
+/// An axis or plotter with compliant gears and no damping, whose encoder is at this place.
+fn with_gears(kind: MachineKind, model: &str, place: &str, chance: &mut Chance) -> Machine {
+    let name = kind.word();
+    let mut number = |low: f64, high: f64| chance.scaled(low, high);
+    let motor = format!(
+        "torque_constant = 0.05\nback_emf_constant = 0.05\nresistance = 1\nrotor_inertia = {}\ngear_ratio = {}\n\
+         gear_efficiency = {}\ngear_stiffness = {}\nbacklash = 1e-3\n[amplifier]\nmode = \"current\"\n",
+        number(1e-6, 1e-4),
+        number(1.0, 6.0),
+        number(0.6, 1.0),
+        number(20.0, 2000.0),
+    );
+    let masses = match kind {
+        MachineKind::Axis => {
+            format!("[idler_pulley]\ninertia = {}\n[cart]\nmass = {}\n", number(1e-6, 1e-4), number(0.2, 4.0))
+        }
+        _ => format!("[bridge]\nmass = {}\n[cart]\nmass = {}\n", number(0.5, 4.0), number(0.2, 2.0)),
+    };
+    let spans: Vec<String> = kind.geometry().spans.iter().map(|_| number(2e4, 4e5).to_string()).collect();
+    let text = format!(
+        "kind = \"{name}\"\n[motor]\n{motor}[drive_pulley]\nradius = 0.01\ninertia = {}\n{masses}[belt]\n\
+         {model}stiffness = [{}]\n[encoder]\nat = \"{place}\"\nlines = 500\n",
+        number(1e-6, 1e-4),
+        spans.join(", ")
+    );
+    Case::from_text("gears.toml", &text).unwrap_or_else(|error| panic!("{error}\n{text}")).machine
+}
+
+/// Frequencies of the linear model, Hz, with what the encoder reads held: a rotor by an enormous inertia.
+fn by_the_linear_model(machine: &Machine, drive: Drive, place: &str) -> Vec<f64> {
+    let (mut machine, mut operation) = (machine.clone(), Operation::default());
+    match (drive, place) {
+        (Drive::Free, _) => {}
+        (Drive::Held, "motor") => machine.drives.iter_mut().for_each(|unit| unit.motor.rotor_inertia = 1e4),
+        (Drive::Held, _) => machine.geometry().drives.iter().for_each(|at| operation.held[at.pulley] = true),
+    }
+    let poles = System::new(&machine, operation).unwrap().input(0).poles().unwrap();
+    Root::from_values(&poles).into_iter().filter_map(Root::hertz).collect()
+}
+
+/// With a compliant gear the rotor is a body: its modes were those of a rigid gear. They are the poles of the linear
+/// model.
+#[test]
+fn modes_of_compliant_gears_are_those_of_the_linear_model() {
+    let mut chance = Chance::new(3);
+    let kinds = [MachineKind::Axis, MachineKind::HFrame, MachineKind::CoreXy];
+    let variants = kinds.into_iter().flat_map(|kind| {
+        let models: &[&str] = if kind == MachineKind::Axis { &["", "model = \"two-mass\"\n"] } else { &[""] };
+        models.iter().flat_map(move |model| ["motor", "drive_pulley"].map(|place| (kind, *model, place)))
+    });
+    for (kind, model, place) in variants.flat_map(|one| std::iter::repeat_n(one, 8)) {
+        let machine = with_gears(kind, model, place, &mut chance);
+        for drive in [Drive::Free, Drive::Held] {
+            let poles = by_the_linear_model(&machine, drive, place);
+            for coordinate in 0..kind.geometry().slides.len() {
+                let modes = resonances(&machine, drive, coordinate).unwrap();
+                assert!(modes.iter().any(|mode| mode.share == 1.0));
+                for mode in modes {
+                    let off =
+                        poles.iter().map(|pole| (pole / mode.frequency - 1.0).abs()).fold(f64::INFINITY, f64::min);
+                    assert!(off < 1e-6, "{kind:?} {model} {place} {drive:?}: {mode:?}, poles at {poles:?} Hz");
+                }
+            }
+        }
+    }
 }

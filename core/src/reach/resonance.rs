@@ -2,7 +2,7 @@
 //! matrix of the cart's position.
 
 use crate::error::{Error, Result};
-use crate::machine::{AmplifierMode, BeltModel, DriveAt, DriveUnit, Machine, Travel};
+use crate::machine::{AmplifierMode, BeltModel, DriveAt, DriveUnit, EncoderPlace, GearPlay, Machine, Travel};
 use crate::mechanism::{Body, Phases};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
@@ -17,8 +17,9 @@ const LEAST: f64 = 1e-3;
 /// The state of the drive pulley.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Drive {
-    /// A position loop makes it follow its command: the cart vibrates on its belt. A stepper holds it by the stiffness
-    /// of its field, so its rotor also vibrates.
+    /// A position loop makes it follow its command: the cart vibrates on its belt. With an encoder before a compliant
+    /// gear, the rotor follows, and the cart vibrates on gear and belt. A stepper holds its rotor by the stiffness of
+    /// its field, so that vibrates too.
     #[default]
     Held,
     /// The motor's torque is commanded and the pulley moves: resonance of the open loop.
@@ -152,13 +153,18 @@ fn with(at: &[f64], number: usize, place: f64) -> Vec<f64> {
 fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) -> Vec<Resonance> {
     let geometry = machine.geometry();
     let (m, c, k) = matrices(machine, drive, slides);
-    // Held drive pulleys, the first bodies, are not coordinates, but act through their columns of K.
-    let drives = geometry.drives.len();
+    let shafts = shafts(machine, m.nrows());
     let fields: Option<Vec<f64>> = machine.drives.iter().map(field).collect();
-    let first = if drive == Drive::Held && fields.is_none() { drives } else { 0 };
-    let size = m.nrows() - first;
-    let part = |a: &DMatrix<f64>| a.view((first, first), (size, size)).into_owned();
-    let root = m.diagonal().rows(first, size).map(|mass| mass.sqrt().recip());
+    // Held bodies are not coordinates, but act through their columns of K.
+    let held: Vec<usize> = match (drive, &fields) {
+        (Drive::Held, None) => shafts.iter().map(|shaft| shaft.held).collect(),
+        _ => Vec::new(),
+    };
+    let kept: Vec<usize> = (0..m.nrows()).filter(|body| !held.contains(body)).collect();
+    let size = kept.len();
+    let place = |body: usize| kept.iter().position(|own| *own == body);
+    let part = |a: &DMatrix<f64>| a.select_rows(&kept).select_columns(&kept);
+    let root = part(&m).diagonal().map(|mass| mass.sqrt().recip());
     // L⁻¹ with M = L Lᵀ, of a bridge that yaws
     let lower = machine.yaw.and_then(|_| part(&m).cholesky()?.l().try_inverse());
     let scaled = match &lower {
@@ -168,28 +174,21 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
     };
     let eigen = SymmetricEigen::new(scaled);
     let slide = &geometry.slides[coordinate];
-    let force = match (drive, fields) {
-        // A command step acts on the rotors by the stiffness of their fields.
-        (Drive::Held, Some(fields)) => {
-            let mut force = DVector::zeros(size);
-            for (at, field) in geometry.drives.iter().zip(fields) {
-                force[at.pulley] = field * geometry.bodies[at.pulley].by_slides[coordinate];
+    let share = |at: &DriveAt| geometry.bodies[at.pulley].by_slides[coordinate];
+    let mut force = DVector::zeros(size);
+    for ((number, at), shaft) in geometry.drives.iter().enumerate().zip(&shafts) {
+        match (drive, &fields) {
+            // A command step acts on the rotors by the stiffness of their fields.
+            (Drive::Held, Some(fields)) => {
+                place(shaft.driven).into_iter().for_each(|i| force[i] = fields[number] * share(at))
             }
-            force
+            // A step of the drives for a unit step of the coordinate acts by their columns of −K.
+            (Drive::Held, None) => force -= k.column(shaft.held).select_rows(&kept) * share(at),
+            // The torques that push the coordinate: Σ τ_k dφ_k = F dq
+            (Drive::Free, _) => place(shaft.driven).into_iter().for_each(|i| force[i] = slide.by_drives[number]),
         }
-        // A step of the drives for a unit step of the coordinate acts by their columns of −K.
-        (Drive::Held, None) => {
-            let share = |at: &DriveAt| geometry.bodies[at.pulley].by_slides[coordinate];
-            let column = |at: &DriveAt| -k.view((first, at.pulley), (size, 1)).column(0) * share(at);
-            geometry.drives.iter().map(column).fold(DVector::zeros(size), |sum, column| sum + column)
-        }
-        // The torques that push the coordinate: Σ τ_k dφ_k = F dq
-        (Drive::Free, _) => DVector::from_fn(size, |i, _| {
-            let of = geometry.drives.iter().zip(slide.by_drives).find(|(at, _)| at.pulley == i);
-            of.map_or(0.0, |(_, weight)| *weight)
-        }),
-    };
-    let load = slide.body - first;
+    }
+    let load = place(slide.body).unwrap_or_default();
     let stiffest = eigen.eigenvalues.max();
     let mode = |i: usize| {
         let squared = eigen.eigenvalues[i];
@@ -217,10 +216,33 @@ fn field(unit: &DriveUnit) -> Option<f64> {
     Phases::of_motor(&unit.motor, &unit.amplifier).map(|phases| phases.stiffness())
 }
 
-/// M, C and K over the bodies other than rotors; over φ₁ and x for a two-mass axis.
+/// Rows of the matrices of a drive.
+struct Shaft {
+    pulley: usize,
+    /// What the motor turns: the rotor of a compliant gear, or the pulley.
+    driven: usize,
+    /// What a position loop holds.
+    held: usize,
+}
+
+/// The rows of each drive in matrices of this size, the last of which are those of rotors.
+fn shafts(machine: &Machine, rows: usize) -> Vec<Shaft> {
+    let is_read_before = machine.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Motor);
+    let mut rotor = rows - machine.drives.iter().filter(|unit| unit.motor.gear_play.is_some()).count();
+    let mut shaft = |(at, unit): (&DriveAt, &DriveUnit)| {
+        let (pulley, mut driven) = (at.pulley, at.pulley);
+        if unit.motor.gear_play.is_some() {
+            (driven, rotor) = (rotor, rotor + 1);
+        }
+        Shaft { pulley, driven, held: if is_read_before { driven } else { pulley } }
+    };
+    machine.geometry().drives.iter().zip(&machine.drives).map(&mut shaft).collect()
+}
+
+/// M, C and K over all bodies; over φ₁, x and the rotor of a compliant gear for a two-mass axis.
 fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
     let (geometry, mechanism) = (machine.geometry(), machine.mechanism());
-    let count = mechanism.held_bodies().end;
+    let count = mechanism.bodies.len();
     let mut stiffness: Vec<f64> = machine.belt.stiffness.into_iter().collect();
     let mut damping: Vec<f64> = machine.belt.damping.into_iter().collect();
     if let (Some(lengths), Some(make)) = (machine.span_lengths(slides), &machine.belt.make) {
@@ -241,30 +263,48 @@ fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, D
     let mut masses: Vec<f64> = bodies.iter().map(|body| body.inertia).collect();
     let viscous = |body: &Body| 0.5 * (body.friction.forward.viscous + body.friction.backward.viscous);
     let mut resisting: Vec<f64> = bodies.iter().map(viscous).collect();
-    for (at, DriveUnit { motor, amplifier }) in geometry.drives.iter().zip(&machine.drives) {
+    for (drive_at, DriveUnit { motor, amplifier }) in shafts(machine, count).iter().zip(&machine.drives) {
         let n = motor.gear_ratio;
         // J₁ + η n² J_r while the motor drives
-        masses[at.pulley] += motor.gear_efficiency * n * n * motor.rotor_inertia;
+        match drive_at.driven == drive_at.pulley {
+            true => masses[drive_at.pulley] += motor.gear_efficiency * n * n * motor.rotor_inertia,
+            false => masses[drive_at.driven] *= motor.gear_efficiency,
+        }
         if drive == Drive::Free && amplifier.mode == AmplifierMode::Voltage {
             // η n² K_t K_e / R, of an armature without inductance
             let passed = motor.gear_efficiency * motor.torque_constant;
-            resisting[at.pulley] += n * n * passed * motor.back_emf_constant / motor.resistance;
+            resisting[drive_at.driven] += n * n * passed * motor.back_emf_constant / motor.resistance;
         }
     }
+    // Beside the spans: gears, whose rotors feel 1/η of their torque, and the field that turns a stepper.
+    let beside = |size: usize, values: fn(&GearPlay) -> f64, is_field: bool| {
+        let mut all = DMatrix::zeros(size, size);
+        for (shaft, unit) in shafts(machine, size).iter().zip(&machine.drives) {
+            let (i, j) = (shaft.pulley, shaft.driven);
+            let own = unit.motor.gear_play.as_ref().map_or(0.0, values);
+            for (row, column, sign) in [(i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)] {
+                all[(row, column)] += sign * own;
+            }
+            if is_field {
+                all[(j, j)] += field(unit).unwrap_or(0.0);
+            }
+        }
+        all
+    };
+    let springs = |size: usize| beside(size, |play| play.stiffness, drive == Drive::Held);
+    let dampers = |size: usize| beside(size, |play| play.damping, false);
     let diagonal = |values: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(values));
-    let mut held = vec![0.0; count];
-    if drive == Drive::Held {
-        for (at, unit) in geometry.drives.iter().zip(&machine.drives) {
-            held[at.pulley] = field(unit).unwrap_or(0.0);
-        }
-    }
     if let (BeltModel::TwoMass, [k1, k2, k3], [c1, c2, c3]) = (machine.belt.model, &stiffness[..], &damping[..]) {
         // Spans 2 and 3 in series between the cart and both pulleys, which turn as one.
         let (r, all) = (machine.pulley_radius, k2 + k3);
         let (k, c) = (k1 + k2 * k3 / all, c1 + (c2 * k3 * k3 + c3 * k2 * k2) / (all * all));
-        let both = |value: f64| DMatrix::from_row_slice(2, 2, &[r * r * value, -r * value, -r * value, value]);
-        let two = |values: &[f64]| diagonal(&[values[0] + values[2], values[1]]);
-        return (two(&masses), both(c) + two(&resisting), both(k) + two(&held));
+        let both = |value: f64| {
+            let own = DMatrix::from_row_slice(2, 2, &[r * r * value, -r * value, -r * value, value]);
+            own.resize(count - 1, count - 1, 0.0)
+        };
+        let merged = |values: &[f64]| diagonal(&[&[values[0] + values[2], values[1]], &values[3..]].concat());
+        let size = count - 1;
+        return (merged(&masses), both(c) + merged(&resisting) + dampers(size), both(k) + springs(size));
     }
     // A pulley without inertia follows at once; a tiny inertia keeps the mass matrix regular.
     let tiny = 1e-9 * machine.cart.mass * machine.pulley_radius * machine.pulley_radius;
@@ -273,5 +313,5 @@ fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, D
     let bodies: Vec<usize> = (0..count).collect();
     let position = machine.without_strain(slides, &[]).position;
     mechanism.ridden_mass(&bodies, &position).into_iter().for_each(|(i, j, own)| mass[(i, j)] += own);
-    (mass, sum(&damping) + diagonal(&resisting), sum(&stiffness) + diagonal(&held))
+    (mass, sum(&damping) + diagonal(&resisting) + dampers(count), sum(&stiffness) + springs(count))
 }
