@@ -36,14 +36,10 @@ pub fn output(quantity: Quantity, values: Vec<f64>) -> Output {
 /// were those of other problems, and a studio that drew them stopped.
 pub fn fitted_in_steps(case: &Case, plan: &Plan, stop: Option<Stop>) -> Result<Fit> {
     let problem = Problem::new(case, plan)?;
-    let bounds = problem.bounds();
-    let (low, high) = (&bounds.low, &bounds.high);
     let mut steps = 0;
     let found = fit_watched(case, plan, stop, &mut |x, _| {
         steps += 1;
-        assert_eq!(x.len(), problem.variables(), "step {steps}");
-        let is_within = x.iter().zip(low.iter().zip(high)).all(|(x, (low, high))| (low..=high).contains(&x));
-        assert!(is_within, "step {steps}: {x:?} of {low:?} to {high:?}");
+        assert!(x.len() == problem.variables() && x.iter().all(|x| x.is_finite()), "step {steps}: {x:?}");
         Flow::Continue
     });
     assert!(steps > 0 || found.is_err());
