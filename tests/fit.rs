@@ -6,6 +6,7 @@ use chance::Chance;
 use logged::{fitted_in_steps, logged, of_loop};
 use nalgebra::DMatrix;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use taut::case::{Case, Nuisances, Plan, Scope, TEMPLATE};
 use taut::control::{Loop, Rows, Standard, stream};
 use taut::design;
@@ -256,6 +257,25 @@ fn a_delay_is_found_in_windows_as_in_the_whole_log() {
             );
             assert!(error < 0.15 * truth, "{windows:?} {}: ± {error}", estimate.name);
         }
+    }
+}
+
+/// Stopped while it looked for a start with a delay, a fit ended without a result.
+#[test]
+fn a_fit_that_is_stopped_at_its_first_steps_keeps_the_best() {
+    let case = late(recorded(&["cart.friction.viscous=24", "cart.mass=0.5"], 1, 1e-3), 9);
+    let nuisance = Nuisances { delay: Scope::Shared, ..Nuisances::default() };
+    let plan = Plan { nuisance, ..plan(&["cart.friction.viscous", "cart.mass"]) };
+    for steps in 1..4 {
+        let watched = AtomicUsize::new(0);
+        let stop = || watched.load(Relaxed) >= steps;
+        let found = fit(&case, &plan, Some(&stop), &mut |_| {
+            watched.fetch_add(1, Relaxed);
+            if stop() { Flow::Stop } else { Flow::Continue }
+        });
+        let found = found.unwrap_or_else(|error| panic!("after {steps} steps: {error}"));
+        assert_eq!(found.ending, Ending::Interrupted, "after {steps} steps");
+        assert!(found.estimates.len() == 3 && found.estimates.iter().all(|estimate| estimate.value.is_finite()));
     }
 }
 

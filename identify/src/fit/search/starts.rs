@@ -106,7 +106,10 @@ pub(crate) fn search_as_far<'a>(
         true => (problem.start(), None),
         false => first_guess(case, plan, &mut problem, &mut search)?,
     };
-    let mut best = search.descend(&mut problem, &start, &whole);
+    let mut best = match problem.is_stopped() {
+        true => stopped_at(&mut problem, &start),
+        false => search.descend(&mut problem, &start, &whole),
+    };
     if let Some(other) = other.filter(|_| times_noise(&problem, &best) > FAR_BEYOND_NOISE) {
         let trial = search.descend(&mut problem, &other, &whole);
         if trial.ending != Ending::Failed && trial.cost < best.cost {
@@ -187,6 +190,17 @@ pub(crate) fn search_as_far<'a>(
     }
     let work = Work { simulations: problem.simulations, ..search.work };
     Ok(Searched { problem, best, noise, starts, work })
+}
+
+/// The result of a search that was stopped while it looked for a start: the best one so far.
+fn stopped_at(problem: &mut Problem, start: &[f64]) -> Minimum {
+    let (mut whole, bounds) = (problem.clone().stopped_by(None), problem.bounds());
+    let found = Minimum::linearised(&mut whole, start, &bounds);
+    problem.simulations = whole.simulations;
+    match found {
+        Some(found) => Minimum { ending: Ending::Interrupted, ..found },
+        None => Minimum::unknown(start, problem.rows(), &bounds),
+    }
 }
 
 /// The result without a search.
@@ -329,6 +343,7 @@ fn first_guess(
         _ => in_windows(case, plan, problem, &start, search)?,
     };
     let guess = match guess {
+        Some(guess) if problem.is_stopped() => guess,
         Some(guess) => better(problem, start, guess),
         None => start,
     };
@@ -492,7 +507,7 @@ fn in_windows(
             break;
         }
     }
-    Ok(best.map(|best| best.x))
+    Ok(best.map(|best| best.x).or_else(|| problem.is_stopped().then_some(guess)))
 }
 
 /// A fit in short windows, each with a start of its own.
