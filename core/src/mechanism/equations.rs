@@ -55,7 +55,7 @@ impl Mechanism {
     }
 
     /// The spring that represents a drive's compliant gear.
-    pub(super) fn gear_spring(&self, drive: usize) -> Option<usize> {
+    pub(crate) fn gear_spring(&self, drive: usize) -> Option<usize> {
         let drive = &self.drives[drive];
         let is_gear = |arms: &[(usize, f64)]| arms.iter().any(|&(body, _)| body == drive.shaft);
         drive.has_rotor().then(|| self.springs.iter().position(|spring| is_gear(&spring.arms))).flatten()

@@ -2,8 +2,8 @@
 //! matrix of the cart's position.
 
 use crate::error::{Error, Result};
-use crate::machine::{AmplifierMode, BeltModel, DriveAt, DriveUnit, EncoderPlace, GearPlay, Machine, Travel};
-use crate::mechanism::{Body, Phases};
+use crate::machine::{AmplifierMode, BeltModel, DriveAt, EncoderPlace, Machine, Travel};
+use crate::mechanism::{self, Body, Mechanism, Phases, Spring};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::PI;
 
@@ -151,16 +151,18 @@ fn with(at: &[f64], number: usize, place: f64) -> Vec<f64> {
 
 /// Modes at one position; `share` is not yet relative.
 fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) -> Vec<Resonance> {
-    let geometry = machine.geometry();
-    let (m, c, k) = matrices(machine, drive, slides);
-    let shafts = shafts(machine, m.nrows());
-    let fields: Option<Vec<f64>> = machine.drives.iter().map(field).collect();
+    let (geometry, mechanism) = (machine.geometry(), machine.mechanism());
+    let (m, c, k) = matrices(machine, &mechanism, drive, slides);
+    let fields: Option<Vec<f64>> = mechanism.drives.iter().map(field).collect();
     // Held bodies are not coordinates, but act through their columns of K.
+    let is_read_before = machine.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Motor);
     let held: Vec<usize> = match (drive, &fields) {
-        (Drive::Held, None) => shafts.iter().map(|shaft| shaft.held).collect(),
+        (Drive::Held, None) => {
+            mechanism.drives.iter().map(|own| if is_read_before { own.shaft } else { own.pulley }).collect()
+        }
         _ => Vec::new(),
     };
-    let kept: Vec<usize> = (0..m.nrows()).filter(|body| !held.contains(body)).collect();
+    let kept: Vec<usize> = mechanism.leaders().filter(|body| !held.contains(body)).collect();
     let size = kept.len();
     let place = |body: usize| kept.iter().position(|own| *own == body);
     let part = |a: &DMatrix<f64>| a.select_rows(&kept).select_columns(&kept);
@@ -176,16 +178,16 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
     let slide = &geometry.slides[coordinate];
     let share = |at: &DriveAt| geometry.bodies[at.pulley].by_slides[coordinate];
     let mut force = DVector::zeros(size);
-    for ((number, at), shaft) in geometry.drives.iter().enumerate().zip(&shafts) {
+    for (number, (at, own)) in geometry.drives.iter().zip(&mechanism.drives).enumerate() {
         match (drive, &fields) {
             // A command step acts on the rotors by the stiffness of their fields.
             (Drive::Held, Some(fields)) => {
-                place(shaft.driven).into_iter().for_each(|i| force[i] = fields[number] * share(at))
+                place(own.shaft).into_iter().for_each(|i| force[i] = fields[number] * share(at))
             }
             // A step of the drives for a unit step of the coordinate acts by their columns of −K.
-            (Drive::Held, None) => force -= k.column(shaft.held).select_rows(&kept) * share(at),
+            (Drive::Held, None) => force -= k.column(held[number]).select_rows(&kept) * share(at),
             // The torques that push the coordinate: Σ τ_k dφ_k = F dq
-            (Drive::Free, _) => place(shaft.driven).into_iter().for_each(|i| force[i] = slide.by_drives[number]),
+            (Drive::Free, _) => place(own.shaft).into_iter().for_each(|i| force[i] = slide.by_drives[number]),
         }
     }
     let load = place(slide.body).unwrap_or_default();
@@ -212,37 +214,19 @@ fn at(machine: &Machine, (drive, coordinate): (Drive, usize), slides: &[f64]) ->
 }
 
 /// Stiffness of the field of a stepper, N m/rad.
-fn field(unit: &DriveUnit) -> Option<f64> {
-    Phases::of_motor(&unit.motor, &unit.amplifier).map(|phases| phases.stiffness())
+fn field(drive: &mechanism::Drive) -> Option<f64> {
+    Phases::of_motor(&drive.motor, &drive.amplifier).map(|phases| phases.stiffness())
 }
 
-/// Rows of the matrices of a drive.
-struct Shaft {
-    pulley: usize,
-    /// What the motor turns: the rotor of a compliant gear, or the pulley.
-    driven: usize,
-    /// What a position loop holds.
-    held: usize,
-}
-
-/// The rows of each drive in matrices of this size, the last of which are those of rotors.
-fn shafts(machine: &Machine, rows: usize) -> Vec<Shaft> {
-    let is_read_before = machine.encoder.is_some_and(|encoder| encoder.at == EncoderPlace::Motor);
-    let mut rotor = rows - machine.drives.iter().filter(|unit| unit.motor.gear_play.is_some()).count();
-    let mut shaft = |(at, unit): (&DriveAt, &DriveUnit)| {
-        let (pulley, mut driven) = (at.pulley, at.pulley);
-        if unit.motor.gear_play.is_some() {
-            (driven, rotor) = (rotor, rotor + 1);
-        }
-        Shaft { pulley, driven, held: if is_read_before { driven } else { pulley } }
-    };
-    machine.geometry().drives.iter().zip(&machine.drives).map(&mut shaft).collect()
-}
-
-/// M, C and K over all bodies; over φ₁, x and the rotor of a compliant gear for a two-mass axis.
-fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
-    let (geometry, mechanism) = (machine.geometry(), machine.mechanism());
-    let count = mechanism.bodies.len();
+/// M, C and K over all bodies; the rows of a pulley that follows another, as in a two-mass belt, are in those of the
+/// other.
+fn matrices(
+    machine: &Machine,
+    mechanism: &Mechanism,
+    drive: Drive,
+    slides: &[f64],
+) -> (DMatrix<f64>, DMatrix<f64>, DMatrix<f64>) {
+    let (geometry, count) = (machine.geometry(), mechanism.bodies.len());
     let mut stiffness: Vec<f64> = machine.belt.stiffness.into_iter().collect();
     let mut damping: Vec<f64> = machine.belt.damping.into_iter().collect();
     if let (Some(lengths), Some(make)) = (machine.span_lengths(slides), &machine.belt.make) {
@@ -253,59 +237,55 @@ fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, D
     // The bearings of a bridge that yaws stand behind the spans.
     stiffness.extend(machine.yaw.map(|yaw| yaw.stiffness()));
     damping.extend(machine.yaw.map(|yaw| yaw.damping()));
-    let arm = |span: usize, body: usize| mechanism.stretch_rate(span).speed[body];
-    // Σ k dᵀ d over the spans' stretches d
-    let sum = |values: &[f64]| {
-        let term = |i: usize, j: usize| values.iter().enumerate().map(|(s, k)| k * arm(s, i) * arm(s, j)).sum::<f64>();
+    let arm = |spring: usize, body: usize| mechanism.stretch_rate(spring).speed[body];
+    let gears: Vec<usize> = (0..mechanism.drives.len()).filter_map(|drive| mechanism.gear_spring(drive)).collect();
+    // Σ k dᵀ d over the stretches d of spans and gears
+    let sum = |values: &[f64], of_gear: fn(&Spring) -> f64| {
+        let gears = gears.iter().map(|&gear| (gear, of_gear(&mechanism.springs[gear])));
+        let all: Vec<(usize, f64)> = values.iter().copied().enumerate().chain(gears).collect();
+        let term = |i: usize, j: usize| all.iter().map(|&(s, k)| k * arm(s, i) * arm(s, j)).sum::<f64>();
         DMatrix::from_fn(count, count, term)
     };
-    let bodies = &mechanism.bodies[..count];
-    let mut masses: Vec<f64> = bodies.iter().map(|body| body.inertia).collect();
+    let mut masses: Vec<f64> = mechanism.bodies.iter().map(|body| body.inertia).collect();
     let viscous = |body: &Body| 0.5 * (body.friction.forward.viscous + body.friction.backward.viscous);
-    let mut resisting: Vec<f64> = bodies.iter().map(viscous).collect();
-    for (drive_at, DriveUnit { motor, amplifier }) in shafts(machine, count).iter().zip(&machine.drives) {
-        let n = motor.gear_ratio;
-        // J₁ + η n² J_r while the motor drives
-        match drive_at.driven == drive_at.pulley {
-            true => masses[drive_at.pulley] += motor.gear_efficiency * n * n * motor.rotor_inertia,
-            false => masses[drive_at.driven] *= motor.gear_efficiency,
+    let mut resisting: Vec<f64> = mechanism.bodies.iter().map(viscous).collect();
+    let mut fields = vec![0.0; count];
+    for own in &mechanism.drives {
+        let (motor, n) = (&own.motor, own.motor.gear_ratio);
+        // J₁ + η n² J_r while the motor drives; a rotor behind a compliant gear feels 1/η of its torque
+        match own.has_rotor() {
+            true => masses[own.shaft] *= motor.gear_efficiency,
+            false => masses[own.shaft] += motor.gear_efficiency * n * n * motor.rotor_inertia,
         }
-        if drive == Drive::Free && amplifier.mode == AmplifierMode::Voltage {
+        if drive == Drive::Free && own.amplifier.mode == AmplifierMode::Voltage {
             // η n² K_t K_e / R, of an armature without inductance
             let passed = motor.gear_efficiency * motor.torque_constant;
-            resisting[drive_at.driven] += n * n * passed * motor.back_emf_constant / motor.resistance;
+            resisting[own.shaft] += n * n * passed * motor.back_emf_constant / motor.resistance;
+        }
+        if drive == Drive::Held {
+            fields[own.shaft] = field(own).unwrap_or(0.0);
         }
     }
-    // Beside the spans: gears, whose rotors feel 1/η of their torque, and the field that turns a stepper.
-    let beside = |size: usize, values: fn(&GearPlay) -> f64, is_field: bool| {
-        let mut all = DMatrix::zeros(size, size);
-        for (shaft, unit) in shafts(machine, size).iter().zip(&machine.drives) {
-            let (i, j) = (shaft.pulley, shaft.driven);
-            let own = unit.motor.gear_play.as_ref().map_or(0.0, values);
-            for (row, column, sign) in [(i, i, 1.0), (j, j, 1.0), (i, j, -1.0), (j, i, -1.0)] {
-                all[(row, column)] += sign * own;
-            }
-            if is_field {
-                all[(j, j)] += field(unit).unwrap_or(0.0);
-            }
+    for body in (0..count).filter(|&body| mechanism.leader(body) != body) {
+        let leader = mechanism.leader(body);
+        masses[leader] += masses[body];
+        resisting[leader] += resisting[body];
+    }
+    let [of_gear_k, of_gear_c]: [fn(&Spring) -> f64; 2] = [|gear| gear.stiffness, |gear| gear.damping];
+    let (k, c) = match (machine.belt.model, &stiffness[..], &damping[..]) {
+        (BeltModel::TwoMass, [k1, k2, k3], [c1, c2, c3]) => {
+            // Spans 2 and 3 in series between the cart and both pulleys, which turn as one.
+            let (r, all) = (machine.pulley_radius, k2 + k3);
+            let (k, c) = (k1 + k2 * k3 / all, c1 + (c2 * k3 * k3 + c3 * k2 * k2) / (all * all));
+            let both = |value: f64| {
+                let own = DMatrix::from_row_slice(2, 2, &[r * r * value, -r * value, -r * value, value]);
+                own.resize(count, count, 0.0)
+            };
+            (both(k) + sum(&[], of_gear_k), both(c) + sum(&[], of_gear_c))
         }
-        all
+        _ => (sum(&stiffness, of_gear_k), sum(&damping, of_gear_c)),
     };
-    let springs = |size: usize| beside(size, |play| play.stiffness, drive == Drive::Held);
-    let dampers = |size: usize| beside(size, |play| play.damping, false);
     let diagonal = |values: &[f64]| DMatrix::from_diagonal(&DVector::from_column_slice(values));
-    if let (BeltModel::TwoMass, [k1, k2, k3], [c1, c2, c3]) = (machine.belt.model, &stiffness[..], &damping[..]) {
-        // Spans 2 and 3 in series between the cart and both pulleys, which turn as one.
-        let (r, all) = (machine.pulley_radius, k2 + k3);
-        let (k, c) = (k1 + k2 * k3 / all, c1 + (c2 * k3 * k3 + c3 * k2 * k2) / (all * all));
-        let both = |value: f64| {
-            let own = DMatrix::from_row_slice(2, 2, &[r * r * value, -r * value, -r * value, value]);
-            own.resize(count - 1, count - 1, 0.0)
-        };
-        let merged = |values: &[f64]| diagonal(&[&[values[0] + values[2], values[1]], &values[3..]].concat());
-        let size = count - 1;
-        return (merged(&masses), both(c) + merged(&resisting) + dampers(size), both(k) + springs(size));
-    }
     // A pulley without inertia follows at once; a tiny inertia keeps the mass matrix regular.
     let tiny = 1e-9 * machine.cart.mass * machine.pulley_radius * machine.pulley_radius;
     masses.iter_mut().for_each(|mass| *mass = mass.max(tiny));
@@ -313,5 +293,5 @@ fn matrices(machine: &Machine, drive: Drive, slides: &[f64]) -> (DMatrix<f64>, D
     let bodies: Vec<usize> = (0..count).collect();
     let position = machine.without_strain(slides, &[]).position;
     mechanism.ridden_mass(&bodies, &position).into_iter().for_each(|(i, j, own)| mass[(i, j)] += own);
-    (mass, sum(&damping) + diagonal(&resisting) + dampers(count), sum(&stiffness) + springs(count))
+    (mass, c + diagonal(&resisting), k + diagonal(&fields))
 }
