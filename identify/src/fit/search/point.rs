@@ -110,7 +110,7 @@ pub struct Minimum {
 
 impl Minimum {
     /// A start within the bounds, whose residuals are not known yet.
-    pub(crate) fn unknown(start: &[f64], rows: usize, bounds: &Bounds) -> Self {
+    fn unknown(start: &[f64], rows: usize, bounds: &Bounds) -> Self {
         let n = start.len();
         Self {
             x: start.iter().enumerate().map(|(j, x)| x.clamp(bounds.low[j], bounds.high[j])).collect(),

@@ -106,10 +106,8 @@ pub(crate) fn search_as_far<'a>(
         true => (problem.start(), None),
         false => first_guess(case, plan, &mut problem, &mut search)?,
     };
-    let mut best = match problem.is_stopped() {
-        true => stopped_at(&mut problem, &start),
-        false => search.descend(&mut problem, &start, &whole),
-    };
+    let stopped = if problem.is_stopped() { stopped_at(&mut problem, &start) } else { None };
+    let mut best = stopped.unwrap_or_else(|| search.descend(&mut problem, &start, &whole));
     if let Some(other) = other.filter(|_| times_noise(&problem, &best) > FAR_BEYOND_NOISE) {
         let trial = search.descend(&mut problem, &other, &whole);
         if trial.ending != Ending::Failed && trial.cost < best.cost {
@@ -193,14 +191,11 @@ pub(crate) fn search_as_far<'a>(
 }
 
 /// The result of a search that was stopped while it looked for a start: the best one so far.
-fn stopped_at(problem: &mut Problem, start: &[f64]) -> Minimum {
+fn stopped_at(problem: &mut Problem, start: &[f64]) -> Option<Minimum> {
     let (mut whole, bounds) = (problem.clone().stopped_by(None), problem.bounds());
     let found = Minimum::linearised(&mut whole, start, &bounds);
     problem.simulations = whole.simulations;
-    match found {
-        Some(found) => Minimum { ending: Ending::Interrupted, ..found },
-        None => Minimum::unknown(start, problem.rows(), &bounds),
-    }
+    found.map(|found| Minimum { ending: Ending::Interrupted, ..found })
 }
 
 /// The result without a search.
@@ -295,7 +290,15 @@ struct Search<'w> {
 
 impl Search<'_> {
     fn descend(&mut self, problem: &mut Problem, x: &[f64], options: &Options) -> Minimum {
-        Self::count(&mut self.work, problem, x, options, self.watch)
+        if x.is_empty() {
+            return as_it_is(problem);
+        }
+        let options = Options { rounding: problem.rounding(), ..*options };
+        let bounds = problem.bounds();
+        let minimum = minimise(problem, x, &bounds, &options, self.watch);
+        self.work.iterations += minimum.iterations;
+        self.work.evaluations += minimum.evaluations;
+        minimum
     }
 
     /// Searches another problem than the one that was asked, which is at `at`; its steps are shown as points of that.
@@ -308,22 +311,14 @@ impl Search<'_> {
         at: &[f64],
     ) -> Minimum {
         let (globals, mut at) = (asked.globals_in(other), at.to_vec());
-        Self::count(&mut self.work, other, x, options, &mut |x, cost| {
+        let mut shown = |x: &[f64], cost: f64| {
             globals.iter().for_each(|&(own, theirs)| at[own] = x[theirs]);
             (self.watch)(&at, cost)
-        })
-    }
-
-    fn count(work: &mut Work, problem: &mut Problem, x: &[f64], options: &Options, watch: &mut Watch) -> Minimum {
-        if x.is_empty() {
-            return as_it_is(problem);
-        }
-        let options = Options { rounding: problem.rounding(), ..*options };
-        let bounds = problem.bounds();
-        let minimum = minimise(problem, x, &bounds, &options, watch);
-        work.iterations += minimum.iterations;
-        work.evaluations += minimum.evaluations;
-        minimum
+        };
+        let mut search = Search { watch: &mut shown, work: self.work };
+        let found = search.descend(other, x, options);
+        self.work = search.work;
+        found
     }
 }
 
