@@ -440,8 +440,8 @@ impl Machine {
 
     /// True if a gear has play, and flanks without damping, which rattle.
     pub fn rattles(&self) -> bool {
-        let plays = self.drives.iter().filter_map(|unit| unit.motor.gear_play);
-        plays.into_iter().any(|play| play.backlash > 0.0 && play.damping == 0.0)
+        let mut plays = self.drives.iter().filter_map(|unit| unit.motor.gear_play);
+        plays.any(|play| play.backlash > 0.0 && play.damping == 0.0)
     }
 
     /// Rejects compliant gears if their bodies and springs exceed the capacity of the solvers.
