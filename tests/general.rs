@@ -5,11 +5,12 @@ use common::random::{self, Dry};
 use proptest::prelude::*;
 use taut::case::Experiment;
 use taut::friction::{Friction, Law, Shape};
+use taut::machine::axis::CART;
 use taut::machine::{BeltMake, Machine, Travel};
 use taut::mechanism::State;
 use taut::polyline::Polyline;
 use taut::signal::Signal;
-use taut::solve::{Dynamics, Ending, Solution, Solver, simulate};
+use taut::solve::{Dynamics, Ending, Quantity, Solution, Solver, simulate};
 
 fn experiment(input: &Signal, until: f64, every: f64) -> Experiment {
     Experiment { every, ..common::experiment(input.clone(), until) }
@@ -67,6 +68,44 @@ proptest! {
         let (a, b) = (run(&machine, &experiment, Solver::Exact), run(&machine, &experiment, Solver::General { tolerance: 1e-11 }));
         let difference = apart(&machine, &a, &b);
         prop_assert!(difference < 1e-9, "{difference:e} m");
+    }
+}
+
+/// The machine without its gear: a motor with n K_t, n K_e and n² J_r turns the pulley as the motor behind its gear.
+fn without_gear(machine: &Machine) -> Machine {
+    let mut direct = machine.clone();
+    let motor = &mut direct.drives[0].motor;
+    let n = std::mem::replace(&mut motor.gear_ratio, 1.0);
+    motor.torque_constant *= n;
+    motor.back_emf_constant *= n;
+    motor.rotor_inertia *= n * n;
+    direct
+}
+
+proptest! {
+    #![proptest_config(random::cases(100))]
+
+    /// A rotor behind a gear moves the pulley as a larger one without the gear, also where friction is curved and the
+    /// gear's losses depend on the direction of its power.
+    #[test]
+    fn a_gear_is_a_slower_and_stronger_motor(
+        machine in random::machine(Dry::Any),
+        rotor in random::decades(1e-6, 1e-4),
+        (ratio, efficiency) in (1.5..8.0, 0.4..0.95),
+        input in random::input()
+    ) {
+        let mut machine = machine;
+        let motor = &mut machine.drives[0].motor;
+        (motor.rotor_inertia, motor.gear_ratio, motor.gear_efficiency) = (rotor, ratio, efficiency);
+        let experiment = experiment(&input, 0.2, 1e-3);
+        for (machine, solver, allowed) in [
+            (machine.clone(), Solver::Exact, 1e-10),
+            (common::with_stribeck(machine), Solver::General { tolerance: 1e-11 }, 1e-9),
+        ] {
+            let direct = without_gear(&machine);
+            let difference = apart(&machine, &run(&machine, &experiment, solver), &run(&direct, &experiment, solver));
+            prop_assert!(difference < allowed, "{solver:?}: {difference:e} m");
+        }
     }
 }
 
@@ -354,6 +393,47 @@ fn the_exact_solver_says_what_it_cannot_take() {
     assert!(refused(&following(Law::Coulomb)).starts_with("the belt's spans follow the cart"));
     assert_eq!(Solver::for_machine(&stage_of(LAWS[3])), Solver::GENERAL);
     assert_eq!(Solver::for_machine(&common::table4()), Solver::Exact);
+}
+
+/// The method of Runge and Kutta on the rates for another integrator goes where a run goes: a motor with inductance,
+/// a constant force on the cart, and bristles or no dry friction.
+#[test]
+fn another_integrator_goes_where_a_run_goes() {
+    let mut smooth = common::table4();
+    for friction in [&mut smooth.drive_pulley.friction, &mut smooth.cart.friction, &mut smooth.idler_pulley.friction] {
+        *friction = Friction::symmetric(friction.forward.viscous, 0.0);
+    }
+    let (h, steps, volts) = (1e-5, 2000, 5.0);
+    for mut machine in [smooth, stage_of(LAWS[3])] {
+        machine.drives[0].motor.inductance = 1e-3;
+        machine.cart.load = 0.3;
+        let input = Signal::Step { value: volts, at: 0.0 };
+        let solution =
+            run(&machine, &experiment(&input, h * f64::from(steps), 1e-3), Solver::General { tolerance: 1e-11 });
+        let mut dynamics = Dynamics::new(&machine.mechanism(), &State::default()).unwrap();
+        let mut rates = |time: f64, values: &[f64]| {
+            let mut rates = vec![0.0; values.len()];
+            dynamics.put(time, values, &[volts, 0.0, 0.0]);
+            dynamics.settle(&mut Vec::new()).unwrap();
+            dynamics.rates(&mut rates);
+            rates
+        };
+        let mut y = vec![0.0; Dynamics::new(&machine.mechanism(), &State::default()).unwrap().quantities().len()];
+        let add = |y: &[f64], k: &[f64], h: f64| -> Vec<f64> { y.iter().zip(k).map(|(y, k)| y + h * k).collect() };
+        for step in 0..steps {
+            let t = h * f64::from(step);
+            let first = rates(t, &y);
+            let second = rates(t + 0.5 * h, &add(&y, &first, 0.5 * h));
+            let third = rates(t + 0.5 * h, &add(&y, &second, 0.5 * h));
+            let fourth = rates(t + h, &add(&y, &third, h));
+            for (place, y) in y.iter_mut().enumerate() {
+                *y += h / 6.0 * (first[place] + 2.0 * (second[place] + third[place]) + fourth[place]);
+            }
+        }
+        let place = dynamics.quantities().iter().position(|quantity| *quantity == Quantity::Position(CART)).unwrap();
+        let cart = *solution.trajectory.get("cart_position").unwrap().last().unwrap();
+        assert!(cart > 1e-4 && (y[place] - cart).abs() < 1e-9, "{} and {cart}", y[place]);
+    }
 }
 
 /// Equations for another integrator counted no events: one that changed an input again and again filled the memory of

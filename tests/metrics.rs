@@ -407,6 +407,27 @@ fn a_constant_input_counts_by_its_time() {
     }
 }
 
+/// A current that follows its command by itself, whatever the motion does, was not tried with peaks between rows.
+#[test]
+fn a_current_loop_peaks_between_rows() {
+    let mut machine = table1();
+    let amplifier = &mut machine.drives[0].amplifier;
+    (amplifier.mode, amplifier.bandwidth) = (AmplifierMode::Current, Some(2000.0));
+    for frequency in [2.0, 7.0, 31.0] {
+        let sine = Signal::Sine { amplitude: 1.5, frequency, phase: 0.3, offset: 0.2 };
+        let peak = |rows: f64| every(&machine, &sine, 0.4, rows, Solver::Exact).1.drive().peak_current;
+        let fine = peak(1e-4);
+        for rows in [0.1, 0.02, 3e-3] {
+            let coarse = peak(rows);
+            let off = (coarse.value - fine.value).abs() / fine.value.abs();
+            assert!(
+                off < 1e-12 && (coarse.time - fine.time).abs() < 1e-6,
+                "{frequency} Hz, {rows} s: {coarse:?} {fine:?}"
+            );
+        }
+    }
+}
+
 #[test]
 fn the_largest_of_three_spans() {
     let peak = |value| Peak { value, time: 1.0 };

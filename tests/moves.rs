@@ -83,6 +83,15 @@ fn integrals_are_those_of_a_dense_quadrature() {
         ] {
             assert!(rows <= peak.abs() * (1.0 + 1e-9) && peak.abs() <= rows * (1.0 + 1e-3), "{name}: {peak} {rows}");
         }
+        for (span, seen) in ["span1_force", "span2_force", "span3_force"].into_iter().zip(&figures.spans) {
+            let force = get(span);
+            let (least, most) =
+                force.iter().fold((0.0, 0.0), |(least, most): (f64, f64), f| (least.min(*f), most.max(*f)));
+            for (name, peak, rows) in [("least", -seen[0].value, -least), ("greatest", seen[1].value, most)] {
+                let near = 1e-3 * (most - least);
+                assert!(rows <= peak * (1.0 + 1e-9) && peak <= rows + near, "{name} of {span}: {peak} {rows}");
+            }
+        }
         let beyond = cart.iter().map(|x| x - motion.profile().target()).fold(0.0, f64::max);
         assert!(
             beyond <= figures.cart().overshoot + 1e-12 && figures.cart().overshoot <= beyond + 1e-9,

@@ -5,7 +5,7 @@ use common::{experiment, table4};
 use taut::case::{Case, Experiment, TEMPLATE};
 use taut::measure::measure;
 use taut::signal::Signal;
-use taut::solve::{Detail, Ending, Flow, Method, Run, Solver, simulate, stream};
+use taut::solve::{Course, Detail, Ending, Flow, Method, Run, Solver, simulate, stream, stream_mechanism};
 use taut::trajectory::Trajectory;
 
 fn every(every: f64, until: f64) -> Experiment {
@@ -34,6 +34,23 @@ fn the_last_row_is_at_the_end_whatever_the_interval() {
             }
         }
         assert_eq!(rows.outcome.events.len(), fine.outcome.events.len());
+    }
+}
+
+/// A run whose rows nobody wants passes as many.
+#[test]
+fn rows_that_are_not_kept_are_counted() {
+    let mechanism = table4().mechanism();
+    for solver in [Solver::Exact, Solver::GENERAL] {
+        for (interval, until) in [(1e-3, 1.2), (0.3, 1.0)] {
+            let Experiment { inputs, initial, every, until, .. } = every(interval, until);
+            let course = Course { inputs, start: initial, until, every };
+            let samples = [Detail::None, Detail::Full].map(|detail| {
+                let sink = &mut |_: &taut::trajectory::Trajectory| Flow::Continue;
+                stream_mechanism(&mechanism, &course, solver, (detail, None), sink).unwrap().cost.samples
+            });
+            assert_eq!(samples[0], samples[1], "{solver:?}, {interval} s");
+        }
     }
 }
 

@@ -26,6 +26,15 @@ fn any_kind() -> impl Strategy<Value = ShaperKind> {
     (0..ShaperKind::ALL.len()).prop_map(|i| ShaperKind::ALL[i])
 }
 
+/// Half of the impulses of an undamped ZV of 50 Hz are 5 ms before the middle and half 5 ms behind it: where a path of
+/// 5 m/s² turns back, it is off by ½ a Σ A (t − t̄)² = 62.5 µm; at a right angle by √2 (v ½ 5 ms + ½ a ½ (5 ms)²), which
+/// is less.
+#[test]
+fn the_usual_corner_is_smoothed_by_what_the_formula_says() {
+    let smoothing = shaper(ShaperKind::Zv, 50.0, 0.0).smoothing(&Corner::default());
+    assert!((smoothing - 62.5e-6).abs() < 1e-15, "{smoothing:e}");
+}
+
 proptest! {
     #[test]
     fn amplitudes_sum_to_one_and_times_ascend(kind in any_kind(), f in 0.1..2000.0, zeta in 0.0..0.9) {

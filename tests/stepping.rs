@@ -177,6 +177,27 @@ fn outputs_are_the_row_of_a_run() {
     }
 }
 
+/// The outputs at the instant of a jump are those behind it: a limit that it meets is met already.
+#[test]
+fn outputs_after_a_jump_are_those_that_follow() {
+    let mut limited = common::table4();
+    let amplifier = &mut limited.drives[0].amplifier;
+    (amplifier.mode, amplifier.voltage_limit) = (taut::machine::AmplifierMode::Current, Some(2.0));
+    let jump = Signal::Step { value: 20.0, at: 0.0 };
+    for solver in [Solver::Exact, Solver::GENERAL] {
+        let rows = simulate(&limited, &common::experiment(jump.clone(), UNTIL), solver).unwrap().trajectory;
+        let mut machine = Simulator::new(&limited, solver).unwrap();
+        machine.set_input(0, &jump.piece(0.0)).unwrap();
+        machine.advance(0.0, &mut Vec::new()).unwrap();
+        let mut outputs = vec![0.0; machine.columns().len()];
+        machine.outputs(&mut outputs);
+        for (heading, have) in machine.columns().iter().zip(outputs) {
+            let want = rows.get(&heading.name).unwrap()[0];
+            assert!((have - want).abs() <= 1e-12 * want.abs(), "{solver:?}, {}: {have} {want}", heading.name);
+        }
+    }
+}
+
 /// The general solver within what it says of itself, and a gantry by both.
 #[test]
 fn the_general_solver_and_gantries_step_too() {
@@ -205,6 +226,38 @@ fn the_general_solver_and_gantries_step_too() {
         same(&own, &events, 1e-11).unwrap();
         let off = (0..4).map(|b| (machine.state().position[b] - state.position[b]).abs()).fold(0.0, f64::max);
         assert!(off < 1e-11, "{}: {off:e}", told["name"]);
+    }
+}
+
+/// Bodies that gain or lose dry friction while they move go on as in a machine that begins there with it.
+#[test]
+fn dry_friction_comes_and_goes_while_a_machine_runs() {
+    let case = Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap();
+    let mut smooth = case.machine.clone();
+    for friction in [&mut smooth.drive_pulley.friction, &mut smooth.cart.friction, &mut smooth.idler_pulley.friction] {
+        *friction = taut::friction::Friction::symmetric(friction.forward.viscous, 0.0);
+    }
+    let (dry, smooth) = (case.machine.mechanism(), smooth.mechanism());
+    let advance = |machine: &mut Simulator, volts: f64, length: f64| {
+        machine.set_input(0, &Signal::Step { value: volts, at: 0.0 }.piece(machine.time())).unwrap();
+        machine.advance(machine.time() + length, &mut Vec::new()).unwrap();
+    };
+    for solver in [Solver::Exact, Solver::GENERAL] {
+        for (first, then) in [(&dry, &smooth), (&smooth, &dry)] {
+            for volts in [5.0, -8.0] {
+                let mut machine = Simulator::of_mechanism(first, &State::default(), solver, 1e-3).unwrap();
+                advance(&mut machine, volts, 0.05);
+                machine.replace(then);
+                let mut fresh = Simulator::of_mechanism(then, &machine.state(), solver, 1e-3).unwrap();
+                advance(&mut machine, 0.0, 0.2);
+                advance(&mut fresh, 0.0, 0.2);
+                let (one, other) = (machine.state(), fresh.state());
+                for body in 0..3 {
+                    let off = (one.position[body] - other.position[body]).abs();
+                    assert!(off < 1e-8, "{solver:?}, {volts} V: body {body} is off by {off:e}");
+                }
+            }
+        }
     }
 }
 

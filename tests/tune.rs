@@ -435,6 +435,23 @@ fn what_is_asked_to_stop_says_what_it_has() {
     assert!(tuned.is_ok_and(|tuned| tuned.holds));
 }
 
+/// A belt without damping is named by its first mode; one with damping, and a rigid one, are not.
+#[test]
+fn an_undamped_belt_is_named_by_its_first_mode() {
+    let tuning = Tuning { cost: Some(Cost::Peak), ..Tuning::default() };
+    let named = |change: &[&str]| {
+        let asked = std::cell::Cell::new(0);
+        let stop = || {
+            asked.set(asked.get() + 1);
+            asked.get() > 40
+        };
+        tune(&case("pid.toml", change), &tuning, &stop).unwrap().undamped
+    };
+    assert!(named(&[]).is_some_and(|mode| (50.0..500.0).contains(&mode)));
+    assert_eq!(named(&["belt.damping=[2, 2, 2]"]), None);
+    assert_eq!(named(&["belt.model=\"rigid\""]), None);
+}
+
 /// A search that may take longer simulates more and finds what is no worse; what may not be is refused.
 #[test]
 fn a_search_takes_the_effort_that_it_may() {

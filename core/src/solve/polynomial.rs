@@ -312,6 +312,24 @@ mod tests {
         Polynomial(c)
     }
 
+    /// Each root between adjacent points at which the sign is asked for is a zero, to the last digits.
+    #[test]
+    fn zeros_are_the_roots() {
+        let mut random = Pcg64::new(7, 1);
+        let mut even = |low: f64, high: f64| low + (high - low) * uniform(&mut random);
+        for _ in 0..20_000 {
+            let mut roots: Vec<f64> = (0..5).map(|_| even(-0.5, 1.5)).collect();
+            roots.sort_by(f64::total_cmp);
+            if roots.windows(2).any(|pair| pair[1] - pair[0] < 1.1 / LOOKS as f64) {
+                continue;
+            }
+            let zeros = with_roots(&roots, even(-1.0, 1.0)).zeros(0.0, 1.0);
+            let inside: Vec<f64> = roots.into_iter().filter(|root| (0.0..=1.0).contains(root)).collect();
+            assert_eq!(zeros.len(), inside.len());
+            zeros.iter().zip(&inside).for_each(|(zero, root)| assert!((zero - root).abs() < 1e-9, "{zero} {root}"));
+        }
+    }
+
     /// If the best of nine points was on a convex part, Newton's method gave up there, and the peak was too low by a
     /// relative 9e-8.
     #[test]

@@ -322,8 +322,8 @@ mod tests {
     use crate::solve::exact::Space;
     use std::sync::Arc;
 
-    /// A cart of 1 kg that slides at 0.3 m/s against 1 N, before a stop that it does not reach.
-    fn sliding() -> Core<16> {
+    /// A cart of 1 kg that slides at a speed, m/s, against 1 N; 1 m before a stop with damping, N s/m.
+    fn sliding(speed: f64, damping: f64) -> Core<16> {
         let label = Label { key: "cart", name: "cart" };
         let cart = Body {
             label,
@@ -336,10 +336,10 @@ mod tests {
             is_rotor: false,
         };
         let law = SpringLaw::Gap { low: -1.0, high: 1.0 };
-        let stop = Spring { label, arms: vec![(0, 1.0)], stiffness: 1e4, damping: 0.0, law, follows: None };
+        let stop = Spring { label, arms: vec![(0, 1.0)], stiffness: 1e4, damping, law, follows: None };
         let mechanism = Mechanism::new(vec![cart], vec![stop], Vec::new());
         let mut start = State::default();
-        start.speed[0] = 0.3;
+        start.speed[0] = speed;
         let space = Arc::new(Space::new(&mechanism, 0));
         Core::new(Arc::new(mechanism), space, &start, (1e-3, f64::INFINITY), Vec::new())
     }
@@ -347,7 +347,7 @@ mod tests {
     /// The speed that falls to zero was assumed to have no rounding error.
     #[test]
     fn a_stop_is_as_uncertain_as_the_speeds_before_it() {
-        let mut core = sliding();
+        let mut core = sliding(0.3, 0.0);
         (1..=29).for_each(|row| core.go_on_to(1e-2 * f64::from(row), &mut Vec::new()).unwrap());
         core.carry_errors();
         let place = core.common.space.layout.speed[0];
@@ -358,5 +358,31 @@ mod tests {
         let crossing = core.crossing(guard.transition).unwrap();
         let rounding = f64::EPSILON * 0.3;
         assert!((0.9..10.0).contains(&(crossing.rounding / rounding)), "{:e}", crossing.rounding);
+    }
+
+    /// S of a damped contact, whose force jumps, and F on both of its sides are the derivatives of runs.
+    #[test]
+    fn errors_go_through_a_contact_as_differences_of_runs_do() {
+        let (off, at) = (1e-6, 0.6);
+        for place in 0..2 {
+            let run = |off: f64| {
+                let mut core = sliding(2.0, 40.0);
+                let layout = &core.common.space.layout;
+                let places = [layout.coordinate[0], layout.speed[0]];
+                core.z[places[place]] += off;
+                if let Some(errors) = &mut core.errors {
+                    errors.c[places[place]][places[place]] = off * off;
+                }
+                core.go_on_to(at, &mut Vec::new()).unwrap();
+                core.carry_errors();
+                let errors = core.errors.as_ref().unwrap();
+                places.map(|place| (core.z[place], errors.c[place][place].sqrt()))
+            };
+            let (more, less) = (run(off), run(-off));
+            for ((more, error), (less, _)) in more.into_iter().zip(less) {
+                let moved = (more - less).abs() / 2.0;
+                assert!((error - moved).abs() < 1e-3 * (moved + off), "{error:e}, {moved:e}");
+            }
+        }
     }
 }
