@@ -197,6 +197,20 @@ fn sines_that_cancel_are_not_named() {
     }
 }
 
+/// A force that goes up and down one and a half times along the travel changes the map and is not called periodic.
+#[test]
+fn what_does_not_repeat_has_no_period() {
+    let plain = case(&[]);
+    let length = 0.19;
+    let point = |k: u32| f64::from(k) / 99.0 * 0.32 - 0.01;
+    let force = |x: f64| 1.2 * (2.0 * PI * x / length).sin();
+    let points: Vec<String> = (0..100).map(|k| format!("[{}, {}]", point(k), force(point(k)))).collect();
+    let truth = case(&[&format!("cart.force_along=[{}]", points.join(", "))]);
+    let found = learned(&plain, &truth, 3);
+    assert!(found.is_significant);
+    assert!(found.components.is_empty(), "{:?}", found.components);
+}
+
 /// A controller that knows the map errs less; one of a machine without a force has nothing to learn.
 #[test]
 fn feed_forward_of_a_map_reduces_the_error() {

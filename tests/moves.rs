@@ -148,6 +148,9 @@ fn figures_do_not_depend_on_the_rows() {
                 ] {
                     assert!((a.abs() - b.abs()).abs() <= 1e-6 * a.abs() + 1e-12, "{name} {what}: {a} {b}");
                 }
+                for (a, b) in a.spans.iter().flatten().zip(b.spans.iter().flatten()) {
+                    assert!((a.value - b.value).abs() <= 1e-9 * a.value.abs(), "{name} span: {a:?} {b:?}");
+                }
             }
         }
     }

@@ -95,10 +95,11 @@ pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Waves {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let whole: Vec<f64> = values.iter().map(|value| value - mean).collect();
     let mut changes = strongest(&whole, 0.0).is_some();
+    let least = MAP_PERIODS / length;
     let (mut numbers, mut found): (Vec<f64>, Vec<(bool, f64)>) = (Vec::new(), Vec::new());
     for _ in 0..MAP_WAVES {
         let Some(left) = without(values, &numbers, noise.step) else { break };
-        let Some((first, chance)) = strongest(&left, MAP_PERIODS / length) else { break };
+        let Some((first, chance)) = strongest(&left, least) else { break };
         changes = true;
         let power = |f: f64| coefficient(&left, f * noise.step).norm_sqr();
         let number = golden::top([first - step, first + step], MAP_SECTIONS, power);
@@ -128,7 +129,9 @@ pub(super) fn search(values: &[f64], noise: &Noise, highest: f64) -> Waves {
         let number = [numbers[k], deviation * own.number];
         let amplitude = [own.size, deviation * own.amplitude];
         let is_clear = amplitude[0] > MAP_ERRORS * amplitude[1];
-        (is_periodic && is_clear).then_some(Wave { number, amplitude, chance })
+        // The flank of a slower one is significant, too.
+        let repeats = numbers[k] > least - step;
+        (is_periodic && is_clear && repeats).then_some(Wave { number, amplitude, chance })
     };
     let mut waves: Vec<Wave> = found.into_iter().enumerate().filter_map(wave).collect();
     waves.sort_by(|a, b| b.amplitude[0].total_cmp(&a.amplitude[0]));
