@@ -1,6 +1,7 @@
 //! Parts that go together: a gear with play and losses, spans that follow the cart with pretension and in reduced
 //! belts.
 
+use crate::common;
 use taut::case::Case;
 use taut::solve::{Ending, Solution, Solver, simulate};
 
@@ -108,20 +109,15 @@ fn a_two_mass_belt_that_follows_the_cart() {
     let (machine, motor) = (&case.machine, &case.machine.drives[0].motor);
     let (r, n, ea) = (machine.pulley_radius, motor.gear_ratio, 8e9 * 5e-6);
     let inertia = machine.drive_pulley.inertia + machine.idler_pulley.inertia + n * n * motor.rotor_inertia;
-    let rate = |[phi, omega, x, v]: [f64; 4]| {
+    let rate = |&[phi, omega, x, v]: &[f64; 4]| {
         // k₁ = E A/(l₁ − x); 2 and 3 in series are one span of l₂ + l₃ + x.
         let force = (ea / (0.4 - x) + ea / (0.45 + 0.85 + x)) * (r * phi - x);
         let torque = n * motor.torque_constant * (6.0 - motor.back_emf_constant * n * omega) / motor.resistance;
         [omega, (torque - 2e-3 * omega - r * force) / inertia, v, (force - 4.0 * v) / machine.cart.mass]
     };
     let (mut y, h) = ([0.0; 4], 1e-6);
-    let add = |y: [f64; 4], k: [f64; 4], h: f64| std::array::from_fn(|j| y[j] + h * k[j]);
     for _ in 0..200_000 {
-        let k1 = rate(y);
-        let k2 = rate(add(y, k1, 0.5 * h));
-        let k3 = rate(add(y, k2, 0.5 * h));
-        let k4 = rate(add(y, k3, h));
-        y = std::array::from_fn(|j| y[j] + h / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j]));
+        common::runge_kutta(&mut y, h, rate);
     }
     let last = |name: &str| *solution.trajectory.get(name).unwrap().last().unwrap();
     assert!((last("cart_position") - y[2]).abs() < 1e-9, "{} {}", last("cart_position"), y[2]);

@@ -280,13 +280,10 @@ proptest! {
     /// x and y of an H-frame are coupled through k_l − k_r alone, where nothing sticks.
     #[test]
     fn equal_spans_do_not_couple(gantry in gantry(), volts in 1.0..12.0_f64) {
-        let mut gantry = Machine { kind: MachineKind::HFrame, ..gantry };
+        let mut gantry = common::without_dry_friction(Machine { kind: MachineKind::HFrame, ..gantry });
         gantry.drives.truncate(2);
         gantry.belt.stiffness = [1e5, 1e5, 6e4].into();
         gantry.belt.damping = [3.0, 3.0, 1.0].into();
-        for friction in [&mut gantry.drive_pulley.friction, &mut gantry.bridge.as_mut().unwrap().friction, &mut gantry.cart.friction] {
-            *friction = Friction::symmetric(friction.forward.viscous, 0.0);
-        }
         let step = |value: f64| Signal::Pulse { value, duration: 0.1, at: 0.0 };
         let across = follow(&gantry, &[step(-volts), step(volts)]);
         proportional((&across, "cart_position"), (&across, "cart_position"), 0.0, 1e-12)?;

@@ -1,5 +1,6 @@
 //! Moves of gantries in closed loop: against an integration that shares no code with the program, and laws.
 
+use crate::common;
 use rand_pcg::Pcg64;
 use std::f64::consts::TAU;
 use taut::case::{Case, Move};
@@ -282,12 +283,7 @@ impl Plain {
             });
             for part in 0..steps {
                 let time = self.every * (sample as f64 + (part + 1) as f64 / steps as f64);
-                let step = |by: f64, rate: &[f64; 10]| std::array::from_fn(|n| z[n] + by * rate[n]);
-                let a = self.rates(&z, volts);
-                let b = self.rates(&step(0.5 * h, &a), volts);
-                let c = self.rates(&step(0.5 * h, &b), volts);
-                let d = self.rates(&step(h, &c), volts);
-                z = std::array::from_fn(|n| z[n] + h / 6.0 * (a[n] + 2.0 * b[n] + 2.0 * c[n] + d[n]));
+                common::runge_kutta(&mut z, h, |z| self.rates(z, volts));
                 let begun = begins.iter().take_while(|begin| **begin <= time).count();
                 let (reference, at) = self.reference(time);
                 lag = lag.max((z[3] - reference[0]).hypot(z[4] - reference[1]));

@@ -173,18 +173,11 @@ impl Plain {
         let begin = &self.case.experiments[0].initial;
         let h = 1e-3 / steps as f64;
         let mut z: Vec<f64> = begin.position[..n].iter().chain(&begin.speed[..n]).copied().collect();
-        let rate = |z: &[f64]| -> Vec<f64> { [&z[n..], &self.accelerations(&z[..n], &z[n..]).0].concat() };
-        let along = |z: &[f64], by: f64, k: &[f64]| -> Vec<f64> { z.iter().zip(k).map(|(z, k)| z + by * k).collect() };
+        let rate = |z: &Vec<f64>| -> Vec<f64> { [&z[n..], &self.accelerations(&z[..n], &z[n..]).0].concat() };
         let mut rows = vec![z.clone()];
         for _ in 0..100 {
             for _ in 0..steps {
-                let a = rate(&z);
-                let b = rate(&along(&z, 0.5 * h, &a));
-                let c = rate(&along(&z, 0.5 * h, &b));
-                let d = rate(&along(&z, h, &c));
-                for i in 0..2 * n {
-                    z[i] += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]);
-                }
+                common::runge_kutta(&mut z, h, rate);
             }
             rows.push(z.clone());
         }

@@ -399,36 +399,23 @@ fn the_exact_solver_says_what_it_cannot_take() {
 /// a constant force on the cart, and bristles or no dry friction.
 #[test]
 fn another_integrator_goes_where_a_run_goes() {
-    let mut smooth = common::table4();
-    for friction in [&mut smooth.drive_pulley.friction, &mut smooth.cart.friction, &mut smooth.idler_pulley.friction] {
-        *friction = Friction::symmetric(friction.forward.viscous, 0.0);
-    }
     let (h, steps, volts) = (1e-5, 2000, 5.0);
-    for mut machine in [smooth, stage_of(LAWS[3])] {
+    for mut machine in [common::without_dry_friction(common::table4()), stage_of(LAWS[3])] {
         machine.drives[0].motor.inductance = 1e-3;
         machine.cart.load = 0.3;
         let input = Signal::Step { value: volts, at: 0.0 };
         let solution =
             run(&machine, &experiment(&input, h * f64::from(steps), 1e-3), Solver::General { tolerance: 1e-11 });
         let mut dynamics = Dynamics::new(&machine.mechanism(), &State::default()).unwrap();
-        let mut rates = |time: f64, values: &[f64]| {
-            let mut rates = vec![0.0; values.len()];
-            dynamics.put(time, values, &[volts, 0.0, 0.0]);
-            dynamics.settle(&mut Vec::new()).unwrap();
-            dynamics.rates(&mut rates);
-            rates
-        };
-        let mut y = vec![0.0; Dynamics::new(&machine.mechanism(), &State::default()).unwrap().quantities().len()];
-        let add = |y: &[f64], k: &[f64], h: f64| -> Vec<f64> { y.iter().zip(k).map(|(y, k)| y + h * k).collect() };
+        let mut y = vec![0.0; dynamics.quantities().len()];
         for step in 0..steps {
-            let t = h * f64::from(step);
-            let first = rates(t, &y);
-            let second = rates(t + 0.5 * h, &add(&y, &first, 0.5 * h));
-            let third = rates(t + 0.5 * h, &add(&y, &second, 0.5 * h));
-            let fourth = rates(t + h, &add(&y, &third, h));
-            for (place, y) in y.iter_mut().enumerate() {
-                *y += h / 6.0 * (first[place] + 2.0 * (second[place] + third[place]) + fourth[place]);
-            }
+            common::runge_kutta(&mut y, h, |values| {
+                let mut rates = vec![0.0; values.len()];
+                dynamics.put(h * f64::from(step), values, &[volts, 0.0, 0.0]);
+                dynamics.settle(&mut Vec::new()).unwrap();
+                dynamics.rates(&mut rates);
+                rates
+            });
         }
         let place = dynamics.quantities().iter().position(|quantity| *quantity == Quantity::Position(CART)).unwrap();
         let cart = *solution.trajectory.get("cart_position").unwrap().last().unwrap();

@@ -233,11 +233,7 @@ fn the_general_solver_and_gantries_step_too() {
 #[test]
 fn dry_friction_comes_and_goes_while_a_machine_runs() {
     let case = Case::from_text("axis.toml", taut::case::TEMPLATE).unwrap();
-    let mut smooth = case.machine.clone();
-    for friction in [&mut smooth.drive_pulley.friction, &mut smooth.cart.friction, &mut smooth.idler_pulley.friction] {
-        *friction = taut::friction::Friction::symmetric(friction.forward.viscous, 0.0);
-    }
-    let (dry, smooth) = (case.machine.mechanism(), smooth.mechanism());
+    let (dry, smooth) = (case.machine.mechanism(), common::without_dry_friction(case.machine.clone()).mechanism());
     let advance = |machine: &mut Simulator, volts: f64, length: f64| {
         machine.set_input(0, &Signal::Step { value: volts, at: 0.0 }.piece(machine.time())).unwrap();
         machine.advance(machine.time() + length, &mut Vec::new()).unwrap();

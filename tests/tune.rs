@@ -14,7 +14,7 @@ use taut::linear::Operation;
 use taut::machine::rigid::Rigid;
 use taut::signal::profile::Reference;
 use taut::solve::{Ending, Solver};
-use taut::tune::{Corner, Family, Figure, Judgement, Margins, Plant, evaluate, hunting, minimise, place, tune};
+use taut::tune::{Corner, Family, Figure, Judgement, Margins, Plant, Tuned, evaluate, hunting, minimise, place, tune};
 
 fn case(name: &str, changes: &[&str]) -> Case {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("stages/sollmann-jouaneh/controllers");
@@ -422,31 +422,26 @@ fn what_is_one_number_by_nature_varies_as_one() {
     assert!(low > 0.8 && low < 0.93 && high < 1.2 && high > 1.07, "{low} {high}");
 }
 
-#[test]
-fn what_is_asked_to_stop_says_what_it_has() {
-    let case = case("pid.toml", &[]);
+/// The result of a search that is stopped when it asks for the 41st time.
+fn stopped(case: &Case) -> Tuned {
     let tuning = Tuning { cost: Some(Cost::Peak), ..Tuning::default() };
     let asked = std::cell::Cell::new(0);
     let stop = || {
         asked.set(asked.get() + 1);
         asked.get() > 40
     };
-    let tuned = tune(&case, &tuning, &stop);
-    assert!(tuned.is_ok_and(|tuned| tuned.holds));
+    tune(case, &tuning, &stop).unwrap()
+}
+
+#[test]
+fn what_is_asked_to_stop_says_what_it_has() {
+    assert!(stopped(&case("pid.toml", &[])).holds);
 }
 
 /// A belt without damping is named by its first mode; one with damping, and a rigid one, are not.
 #[test]
 fn an_undamped_belt_is_named_by_its_first_mode() {
-    let tuning = Tuning { cost: Some(Cost::Peak), ..Tuning::default() };
-    let named = |change: &[&str]| {
-        let asked = std::cell::Cell::new(0);
-        let stop = || {
-            asked.set(asked.get() + 1);
-            asked.get() > 40
-        };
-        tune(&case("pid.toml", change), &tuning, &stop).unwrap().undamped
-    };
+    let named = |changes: &[&str]| stopped(&case("pid.toml", changes)).undamped;
     assert!(named(&[]).is_some_and(|mode| (50.0..500.0).contains(&mode)));
     assert_eq!(named(&["belt.damping=[2, 2, 2]"]), None);
     assert_eq!(named(&["belt.model=\"rigid\""]), None);

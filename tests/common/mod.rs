@@ -74,6 +74,33 @@ pub fn complete(case: &Case, solver: Solver) -> Solution {
     solution
 }
 
+/// One step of length h of Runge and Kutta's method of fourth order.
+pub fn runge_kutta<Y: AsRef<[f64]> + AsMut<[f64]> + Clone>(y: &mut Y, h: f64, mut rate: impl FnMut(&Y) -> Y) {
+    let along = |y: &Y, by: f64, k: &Y| {
+        let mut moved = y.clone();
+        moved.as_mut().iter_mut().zip(k.as_ref()).for_each(|(y, k)| *y += by * k);
+        moved
+    };
+    let a = rate(y);
+    let b = rate(&along(y, 0.5 * h, &a));
+    let c = rate(&along(y, 0.5 * h, &b));
+    let d = rate(&along(y, h, &c));
+    let [a, b, c, d] = [&a, &b, &c, &d].map(AsRef::as_ref);
+    for (i, y) in y.as_mut().iter_mut().enumerate() {
+        *y += h / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]);
+    }
+}
+
+/// The machine with viscous friction alone.
+pub fn without_dry_friction(mut machine: Machine) -> Machine {
+    let bridge = machine.bridge.as_mut().map(|bridge| &mut bridge.friction);
+    let pulleys = [&mut machine.drive_pulley.friction, &mut machine.idler_pulley.friction];
+    for friction in pulleys.into_iter().chain([&mut machine.cart.friction]).chain(bridge) {
+        *friction = Friction::symmetric(friction.forward.viscous, 0.0);
+    }
+    machine
+}
+
 /// F_s = 0.3 F_c on top of each body's Coulomb friction, v_s = 0.05 m/s at the belt.
 pub fn with_stribeck(mut machine: Machine) -> Machine {
     let r = machine.pulley_radius;
