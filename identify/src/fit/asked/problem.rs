@@ -385,8 +385,21 @@ impl<'a> Problem<'a> {
         self.globals_in(other).into_iter().for_each(|(own, other)| x[own] = theirs[other]);
     }
 
+    /// A point with all delays of inputs at these intervals between samples, within their bounds.
+    pub(crate) fn delayed(&self, mut x: Vec<f64>, intervals: f64) -> Vec<f64> {
+        let bounds = self.bounds();
+        self.delays().iter().for_each(|&j| x[j] = intervals.clamp(bounds.low[j], bounds.high[j]));
+        x
+    }
+
+    /// The delay of inputs at a point, in intervals between samples: the mean of all, zero without any.
+    pub(crate) fn delay(&self, x: &[f64]) -> f64 {
+        let delays = self.delays();
+        delays.iter().map(|&j| x[j]).sum::<f64>() / delays.len().max(1) as f64
+    }
+
     /// Indices of the variables that are delays.
-    pub(crate) fn delays(&self) -> Vec<usize> {
+    fn delays(&self) -> Vec<usize> {
         let own = self.runs.iter().flat_map(variable_extras);
         let extras = self.shared.iter().chain(own).zip(self.parameters.len()..);
         extras.filter(|(extra, _)| matches!(extra.what, Nuisance::Delay(_))).map(|(_, index)| index).collect()

@@ -149,14 +149,14 @@ pub fn compare(
         .next("give four logs or more, or leave `loop` out of [fit]"));
     }
     let mut course = Course { case, name, plan, parts, stop, work: Work::default(), tried: Vec::new() };
-    let mut from = case.machine.clone();
+    let mut from = Beginning { machine: case.machine.clone(), delay: None };
     let mut laws = setting.laws.clone();
     laws.sort_by_key(|law| FrictionLaw::ALL.iter().position(|own| own == law));
     laws.dedup();
     for law in laws {
         let sided = law == FrictionLaw::Asymmetric || (law.is_above() && course.is_sided_better());
-        let (own, searched) = laws::with(case, name, plan, law, sided, &from)?;
-        let mut start = own.machine.clone();
+        let (own, searched) = laws::with(case, name, plan, law, sided, &from.machine)?;
+        let mut start = Beginning { machine: own.machine.clone(), ..from };
         let windows = match course.best_window() {
             Some(window) if !has_exact_derivatives(&own.machine) => vec![window],
             _ => setting.windows.clone(),
@@ -167,16 +167,23 @@ pub fn compare(
                 return Err(Error::new("interrupted before all laws were compared"));
             }
             let found = course.try_one(&own, &searched, told, &start);
-            if let Some(machine) = found {
+            if let Some(end) = found {
                 // A law without dry friction makes progress where a cart with it stands still.
                 if window == setting.windows[0] && !law.is_above() && law != FrictionLaw::Viscous {
-                    from = machine.clone();
+                    from = end.clone();
                 }
-                start = machine;
+                start = end;
             }
         }
     }
     course.chosen()
+}
+
+/// Where a search begins: a machine, and the delay of inputs, in intervals between samples, if it is known.
+#[derive(Clone)]
+struct Beginning {
+    machine: Machine,
+    delay: Option<f64>,
 }
 
 /// A comparison in progress.
@@ -210,19 +217,19 @@ impl Tried {
 }
 
 impl Course<'_> {
-    /// Fits a candidate to all logs and to all but a part; the machine of the fit to all.
-    fn try_one(&mut self, case: &Case, plan: &Plan, mut candidate: Candidate, start: &Machine) -> Option<Machine> {
+    /// Fits a candidate to all logs and to all but a part; the end of the fit to all.
+    fn try_one(&mut self, case: &Case, plan: &Plan, mut candidate: Candidate, start: &Beginning) -> Option<Beginning> {
         let plan = Plan { windows: candidate.window, starts: 1, ..plan.clone() };
-        let (given, case) = (case.machine.clone(), Case { machine: start.clone(), ..case.clone() });
-        let (mut errors, mut training, mut machine) = (Vec::new(), Vec::new(), None);
-        match self.whole(&case, &plan) {
-            Ok((own, met)) => (machine, training) = (Some(own), met),
+        let (given, case) = (case.machine.clone(), Case { machine: start.machine.clone(), ..case.clone() });
+        let (mut errors, mut training, mut end) = (Vec::new(), Vec::new(), None);
+        match self.whole(&case, &plan, start.delay) {
+            Ok((own, met)) => (end, training) = (Some(own), met),
             Err(error) => candidate.failed = Some(error.what),
         }
-        if let Some(machine) = &machine {
-            let near = Case { machine: machine.clone(), ..case.clone() };
+        if let Some(end) = &end {
+            let near = Case { machine: end.machine.clone(), ..case.clone() };
             for part in 0..self.parts.folds.len() {
-                match self.fold(&near, &plan, part) {
+                match self.fold(&near, &plan, part, end.delay) {
                     Ok(found) => errors.push(found),
                     Err(error) => {
                         candidate.failed = Some(error.what);
@@ -232,12 +239,17 @@ impl Course<'_> {
             }
         }
         self.tried.push(Tried { candidate, errors, training, case, given, plan });
-        machine
+        end
     }
 
     /// The fit to all logs, and its errors over complete logs with fitted starts.
-    fn whole(&mut self, case: &Case, plan: &Plan) -> Result<(Machine, Vec<(Quantity, f64)>)> {
-        let found = search_as_far(case, plan, self.stop, &Effort::compared(), &mut |_, _| Flow::Continue)?;
+    fn whole(
+        &mut self,
+        case: &Case,
+        plan: &Plan,
+        delay: Option<f64>,
+    ) -> Result<(Beginning, Vec<(Quantity, f64)>)> {
+        let found = search_as_far(case, plan, self.stop, &Effort::compared(delay), &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
         let stages = found.problem.stages(&found.best.x);
         let simulated: Vec<Machine> =
@@ -247,13 +259,20 @@ impl Course<'_> {
         let logs: Vec<_> =
             Problem::new(case, &whole)?.runs.iter().map(|run| met(run, &simulated[run.part], &known, 1.0)).collect();
         let errors = together(&logs, |_| String::new());
-        Ok((stages[0].clone(), errors.iter().map(|one| (one.quantity, one.rmse)).collect()))
+        let end = Beginning { machine: stages[0].clone(), delay: Some(found.delay()) };
+        Ok((end, errors.iter().map(|one| (one.quantity, one.rmse)).collect()))
     }
 
     /// The errors in a part that is not fitted.
-    fn fold(&mut self, case: &Case, plan: &Plan, part: usize) -> Result<Vec<(Quantity, f64, usize)>> {
+    fn fold(
+        &mut self,
+        case: &Case,
+        plan: &Plan,
+        part: usize,
+        delay: Option<f64>,
+    ) -> Result<Vec<(Quantity, f64, usize)>> {
         let parts = &self.parts;
-        let effort = Effort::of_part();
+        let effort = Effort::of_part(delay);
         let (found, work) = errors(case, plan, &parts.folds[part], (parts.is_cut, &effort), self.stop)?;
         self.work.add(&work);
         Ok(found)

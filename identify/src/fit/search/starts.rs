@@ -63,6 +63,11 @@ impl Searched<'_> {
         let noise = self.problem.noise();
         self.noise.iter().map(move |(quantity, deviation)| (*quantity, deviation / noise.deviation(*quantity)))
     }
+
+    /// The delay of inputs, in intervals between samples: the mean of all, zero without any.
+    pub fn delay(&self) -> f64 {
+        self.problem.delay(&self.best.x)
+    }
 }
 
 /// Effort of a search.
@@ -74,18 +79,20 @@ pub(crate) struct Effort {
     /// True if it begins near its end: machines without a balance of torques need no search for a start, and a search
     /// by differences whose iterations are used up does not begin again with new weights.
     pub is_short: bool,
+    /// The delay of inputs at the start, in intervals between samples; `None`: found by fits that hold it.
+    pub delay: Option<f64>,
 }
 
 impl Effort {
     /// Effort of a fit for comparison: a further step would change it far less than models differ on held-out records.
-    pub fn compared() -> Self {
+    pub fn compared(delay: Option<f64>) -> Self {
         let options = Options { tolerance: ROUGH_TOLERANCE, iterations: STEPS, evolutions: 0, ..Options::default() };
-        Self { options, is_straight: true, is_short: false }
+        Self { options, is_straight: true, is_short: false, delay }
     }
 
-    /// Effort of such a fit to a part of the logs, which begins at the result for all of them.
-    pub fn of_part() -> Self {
-        let whole = Self::compared();
+    /// Effort of such a fit to a part of the logs, which begins at the result for all of them, and at its delay.
+    pub fn of_part(delay: Option<f64>) -> Self {
+        let whole = Self::compared(delay);
         Self { options: Options { iterations: STEPS_IN_PART, ..whole.options }, is_short: true, ..whole }
     }
 }
@@ -101,10 +108,11 @@ pub(crate) fn search_as_far<'a>(
     let whole = effort.options;
     let mut problem = Problem::new(case, plan)?.stopped_by(stop).straight(effort.is_straight);
     let mut search = Search { watch, work: Work::default() };
+    let start = problem.delayed(problem.start(), effort.delay.unwrap_or(0.0));
     let (start, other) = match effort.is_short && !problem.machine.has_torque_balance() {
         // It begins at the result for all logs.
-        true => (problem.start(), None),
-        false => first_guess(case, plan, &mut problem, &mut search)?,
+        true => (start, None),
+        false => first_guess(case, plan, &mut problem, (start, effort.delay), &mut search)?,
     };
     let stopped = if problem.is_stopped() { stopped_at(&mut problem, &start) } else { None };
     let mut best = stopped.unwrap_or_else(|| search.descend(&mut problem, &start, &whole));
@@ -324,14 +332,14 @@ impl Search<'_> {
 
 /// Start values of the case or of a regression, with delays after fits that hold them; for a stepper, of fits to the
 /// beginnings of its logs; for several coordinates, of fits in short windows: whichever fits the logs better. Beside
-/// those with delays, the start without them.
+/// those with delays, unless a delay is known, the start without them.
 fn first_guess(
     case: &Case,
     plan: &Plan,
     problem: &mut Problem,
+    (start, delay): (Vec<f64>, Option<f64>),
     search: &mut Search,
 ) -> Result<(Vec<f64>, Option<Vec<f64>>)> {
-    let start = problem.start();
     let guess = match &problem.machine {
         machine if machine.has_torque_balance() => by_regression(problem, &start),
         machine if machine.stepper().is_some() => Some(by_beginnings(case, plan, problem, &start, search)?),
@@ -342,7 +350,7 @@ fn first_guess(
         Some(guess) => better(problem, start, guess),
         None => start,
     };
-    match problem.machine.has_torque_balance() && plan.nuisance.delay != Scope::Off {
+    match problem.machine.has_torque_balance() && plan.nuisance.delay != Scope::Off && delay.is_none() {
         true => Ok((with_delays(case, plan, problem, guess.clone(), search)?, Some(guess))),
         false => Ok((guess, None)),
     }
@@ -387,10 +395,8 @@ fn with_delays(
             _ => break,
         }
     }
-    let (_, intervals, mut x) = best;
-    let bounds = problem.bounds();
-    problem.delays().iter().for_each(|&j| x[j] = intervals.clamp(bounds.low[j], bounds.high[j]));
-    Ok(x)
+    let (_, intervals, x) = best;
+    Ok(problem.delayed(x, intervals))
 }
 
 /// Start from fits to successively longer beginnings of the logs.

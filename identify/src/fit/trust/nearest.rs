@@ -102,8 +102,8 @@ pub(crate) fn search_near<'a>(
     watch: &mut dyn FnMut(&[f64], f64) -> Flow,
 ) -> Result<Settled<'a>> {
     let whole = Options::default();
-    let mut searched =
-        search_as_far(case, plan, stop, &Effort { options: whole, is_straight: false, is_short: false }, watch)?;
+    let effort = Effort { options: whole, is_straight: false, is_short: false, delay: None };
+    let mut searched = search_as_far(case, plan, stop, &effort, watch)?;
     let is_far = searched.problem.differences > 0 && searched.times_noise().any(|(_, times)| times > FAR_BEYOND_NOISE);
     let Searched { problem, best, work, .. } = &mut searched;
     let huber = if plan.huber { HUBER } else { f64::INFINITY };

@@ -237,8 +237,8 @@ impl<'s, 'a> Folds<'s, 'a> {
     }
 
     /// Mean squared error of a part by a fit to the others, in units of the residuals; `None` if it fails.
-    fn mean(&self, case: &Case, plan: &Plan, (fold, is_cut): (&Fold, bool)) -> Option<f64> {
-        let mut effort = Effort::of_part();
+    fn mean(&self, case: &Case, plan: &Plan, delay: f64, (fold, is_cut): (&Fold, bool)) -> Option<f64> {
+        let mut effort = Effort::of_part(Some(delay));
         // Predictions need no exact end.
         effort.options.sharp = false;
         let stop = self.site.found.problem.stop();
@@ -266,10 +266,10 @@ impl<'s, 'a> Folds<'s, 'a> {
         for k in 0..count {
             let Without { parts: before, means } = &self.sets[set];
             if means.len() == k {
-                let mean = self.mean(&self.case, &self.plan, (&before.folds[k], before.is_cut));
+                let mean = self.mean(&self.case, &self.plan, self.site.found.delay(), (&before.folds[k], before.is_cut));
                 self.sets[set].means.push(mean);
             }
-            let with = self.mean(&with, &own, (&parts.folds[k], parts.is_cut))?;
+            let with = self.mean(&with, &own, tried.delay(), (&parts.folds[k], parts.is_cut))?;
             let without = self.sets[set].means[k]?;
             // ln of the ratio, since a part in which a start fails has errors of another magnitude.
             gains.push((without / with).ln());

@@ -319,6 +319,11 @@ impl<'a> Tried<'a> {
         (case, self.extended.plan.clone())
     }
 
+    /// The delay of inputs, in intervals between samples: the mean of all, zero without any.
+    pub fn delay(&self) -> f64 {
+        self.problem.delay(&self.best.x)
+    }
+
     /// The element in words, without its scatter.
     pub fn words(&self, site: &Site) -> String {
         let [value, least] = self.size();
