@@ -2,7 +2,7 @@
 //! belt's modes, chosen by the arrival in the window over a family of machines. [`Quickest`] defines the limits.
 
 use crate::case::{Case, Files, Move};
-use crate::control::{Setup, closed_loop};
+use crate::control::{Figures, Loop, SampledPath, Setup, Standard, closed_loop, closed_loop_briefly, each};
 use crate::design::Design;
 use crate::error::{Error, Result};
 use crate::machine::rigid::Rigid;
@@ -192,6 +192,17 @@ fn roughly(machine: &Machine, motion: &Move) -> Solver {
         }
         solver => solver,
     }
+}
+
+/// End of the runs of a move along shaped profiles, s.
+fn watched_until(motion: &Move, shaped: &[Profile]) -> f64 {
+    Profile::last_rest(shaped) + (motion.until - motion.end()).max(WATCHED)
+}
+
+/// Time of arrival of the cart in a run, s; none if it does not stay in its window.
+fn arrives(profiles: &[Profile], figures: &Figures, ending: Ending) -> Option<f64> {
+    let settling = figures.settling.filter(|_| ending == Ending::Complete);
+    settling.map(|settling| Profile::last_end(profiles) + settling)
 }
 
 /// Results of a run.
@@ -464,19 +475,17 @@ impl Planner<'_> {
 
     /// A run in closed loop, or as steppers take the cart along the references.
     fn run(&self, motion: &Move, profiles: &[Profile], (machine, solver): (&Machine, Solver)) -> Result<Ran> {
-        let watched = (motion.until - motion.end()).max(WATCHED);
         let run = closed_loop(&Setup {
             machine,
             model: &self.family.machine,
             design: self.design,
             profiles,
-            until: Profile::last_rest(&self.design.shaped(profiles)) + watched,
+            until: watched_until(motion, &self.design.shaped(profiles)),
             window: motion.window,
             solver,
         })?;
-        let settling = run.figures.settling.filter(|_| run.outcome.ending == Ending::Complete);
         Ok(Ran {
-            arrives: settling.map(|settling| Profile::last_end(profiles) + settling),
+            arrives: arrives(profiles, &run.figures, run.outcome.ending),
             error: run.figures.worst_load().error.peak.value.abs(),
             saturated: run.figures.saturated(),
             spans: if machine.drives.len() == 1 { run.figures.spans } else { Vec::new() },
@@ -503,13 +512,21 @@ impl Planner<'_> {
         let mut slowest: Option<(f64, &Machine)> = None;
         let begin = *first;
         let others = (0..self.machines.len()).filter(|number| *number != begin);
+        let (mut controllers, timing) =
+            (Standard::of_drives(self.design, &self.family.machine)?, Loop::new(self.design));
+        let shaped = self.design.shaped(profiles);
+        let until = watched_until(motion, &shaped);
+        let path = SampledPath::new(shaped, timing, until);
         for number in std::iter::once(begin).chain(others) {
             if (self.stop)() {
                 return Ok((arrival, None));
             }
             let (machine, count) = &self.machines[number];
-            let smooth = machine.interpolating();
-            let time = self.run(motion, profiles, (&smooth, roughly(machine, motion)))?.arrives;
+            let (smooth, solver) = (machine.interpolating(), roughly(machine, motion));
+            let controllers = &mut each(&mut controllers);
+            let (figures, ending) =
+                closed_loop_briefly(&smooth, controllers, &timing, &path, (until, motion.window), solver)?;
+            let time = arrives(profiles, &figures, ending);
             arrival.settled += if time.is_some() { *count } else { 0 };
             arrival.axes += count;
             let late = time.unwrap_or(f64::INFINITY);

@@ -243,12 +243,7 @@ impl Course<'_> {
     }
 
     /// The fit to all logs, and its errors over complete logs with fitted starts.
-    fn whole(
-        &mut self,
-        case: &Case,
-        plan: &Plan,
-        delay: Option<f64>,
-    ) -> Result<(Beginning, Vec<(Quantity, f64)>)> {
+    fn whole(&mut self, case: &Case, plan: &Plan, delay: Option<f64>) -> Result<(Beginning, Vec<(Quantity, f64)>)> {
         let found = search_as_far(case, plan, self.stop, &Effort::compared(delay), &mut |_, _| Flow::Continue)?;
         self.work.add(&found.work);
         let stages = found.problem.stages(&found.best.x);

@@ -136,13 +136,31 @@ pub(crate) fn is_opposite(problem: &Problem, name: &str) -> bool {
     worst.is_some_and(|correlation| correlation < OPPOSITE)
 }
 
-/// True if a log moves opposite to the model, and the model explains it with its sign reversed.
+/// True if a log moves opposite to the model, and the model explains it with its sign reversed, or that of one of
+/// several outputs of one kind.
 pub(crate) fn is_reversed(case: &Case, plan: &Plan, found: &Searched) -> bool {
-    let mut names: Vec<&str> = found.problem.runs.iter().map(|run| run.name.as_str()).collect();
+    let problem = &found.problem;
+    let mut names: Vec<&str> = problem.runs.iter().map(|run| run.name.as_str()).collect();
     names.dedup();
-    names.retain(|name| is_opposite(&found.problem, name));
-    let mended = || mended(case, plan, found, &names, &Remedy::Reverse, TRIAL_FIT_ITERATIONS);
-    !names.is_empty() && mended().is_some_and(|mended| mended.left <= FACTOR_LEAVES)
+    names.retain(|name| is_opposite(problem, name));
+    if names.is_empty() {
+        return false;
+    }
+    let several = problem.quantities().into_iter().filter(|quantity| !alike(problem, *quantity).is_empty());
+    let mut remedies = std::iter::once(Remedy::Reverse).chain(several.map(Remedy::Flip));
+    let is_mended = |mended: Mended| mended.left <= FACTOR_LEAVES;
+    remedies.any(|remedy| mended(case, plan, found, &names, &remedy, TRIAL_FIT_ITERATIONS).is_some_and(is_mended))
+}
+
+/// The other fitted outputs of the kind of this one.
+pub(super) fn alike(problem: &Problem, quantity: Quantity) -> Vec<Quantity> {
+    let is_alike = |other: &Quantity| {
+        *other != quantity
+            && other.unit() == quantity.unit()
+            && other.is_position() == quantity.is_position()
+            && other.is_linear() == quantity.is_linear()
+    };
+    problem.quantities().into_iter().filter(is_alike).collect()
 }
 
 /// Agreement with corrected logs.

@@ -1,7 +1,7 @@
 //! Reasons why a model explains little of an output: windows, exchanged or reversed columns and factors, each tried by
 //! a fit.
 
-use super::trials::{Mended, mended};
+use super::trials::{Mended, alike, mended};
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
@@ -113,13 +113,7 @@ pub(super) fn of_columns(
     quantity: Quantity,
     names: &[&str],
 ) -> Option<Reason> {
-    let is_alike = |other: &Quantity| {
-        *other != quantity
-            && other.unit() == quantity.unit()
-            && other.is_position() == quantity.is_position()
-            && other.is_linear() == quantity.is_linear()
-    };
-    let others: Vec<Quantity> = found.problem.quantities().into_iter().filter(is_alike).collect();
+    let others = alike(&found.problem, quantity);
     exchange(case, plan, found, (quantity, &others), names)
         .or_else(|| reversal(case, plan, found, (quantity, &others), names))
 }

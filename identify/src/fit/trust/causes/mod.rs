@@ -266,7 +266,8 @@ impl<'s, 'a> Folds<'s, 'a> {
         for k in 0..count {
             let Without { parts: before, means } = &self.sets[set];
             if means.len() == k {
-                let mean = self.mean(&self.case, &self.plan, self.site.found.delay(), (&before.folds[k], before.is_cut));
+                let mean =
+                    self.mean(&self.case, &self.plan, self.site.found.delay(), (&before.folds[k], before.is_cut));
                 self.sets[set].means.push(mean);
             }
             let with = self.mean(&with, &own, tried.delay(), (&parts.folds[k], parts.is_cut))?;
