@@ -8,6 +8,7 @@ use super::scores::beside_log;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::residuals::Residuals;
+use crate::fit::asked::run::MeasuredOutput;
 use crate::fit::limits::{
     FACTOR_LEAVES, HUBER, JUMP, MENDED, NO_WORSE, OPPOSITE, ROUGH_TOLERANCE, STAND_OUT, TRIAL_FIT_ITERATIONS,
     UNIT_WORSE,
@@ -110,11 +111,16 @@ pub(crate) fn is_borne_out(case: &Case, plan: &Plan, found: &Searched, name: &st
     tried.is_empty() || tried.iter().any(is_better)
 }
 
-/// True if a log moves opposite to the model at the start.
+/// True if a log moves opposite to the model at the start, by its first position that is measured from its start.
 pub(crate) fn is_opposite(problem: &Problem, name: &str) -> bool {
+    opposes(problem, name, |seen| seen.quantity.is_position() && !seen.absolute)
+}
+
+/// True if the first such output of a log moves opposite to the model at the start.
+fn opposes(problem: &Problem, name: &str, is_meant: impl Fn(&MeasuredOutput) -> bool) -> bool {
     let (x, mut worst) = (problem.start(), None);
     for (index, run) in problem.runs.iter().enumerate().filter(|(_, run)| run.name == name) {
-        let Some(seen) = run.seen.iter().find(|seen| seen.quantity.is_position() && !seen.absolute) else { continue };
+        let Some(seen) = run.seen.iter().find(|seen| is_meant(seen)) else { continue };
         let mut column = vec![Vec::new()];
         let extras = problem.extras_of(index, &x);
         if !run.predict(&mut Bench::default(), &problem.stage_at(&x), &extras, &[seen.quantity], &mut column) {
@@ -136,20 +142,22 @@ pub(crate) fn is_opposite(problem: &Problem, name: &str) -> bool {
     worst.is_some_and(|correlation| correlation < OPPOSITE)
 }
 
-/// True if a log moves opposite to the model, and the model explains it with its sign reversed, or that of one of
-/// several outputs of one kind.
+/// True if logs move opposite to the model, and it explains them with their signs reversed; or so does one of several
+/// outputs of one kind.
 pub(crate) fn is_reversed(case: &Case, plan: &Plan, found: &Searched) -> bool {
     let problem = &found.problem;
-    let mut names: Vec<&str> = problem.runs.iter().map(|run| run.name.as_str()).collect();
-    names.dedup();
-    names.retain(|name| is_opposite(problem, name));
-    if names.is_empty() {
-        return false;
-    }
-    let several = problem.quantities().into_iter().filter(|quantity| !alike(problem, *quantity).is_empty());
-    let mut remedies = std::iter::once(Remedy::Reverse).chain(several.map(Remedy::Flip));
-    let is_mended = |mended: Mended| mended.left <= FACTOR_LEAVES;
-    remedies.any(|remedy| mended(case, plan, found, &names, &remedy, TRIAL_FIT_ITERATIONS).is_some_and(is_mended))
+    let mut all: Vec<&str> = problem.runs.iter().map(|run| run.name.as_str()).collect();
+    all.dedup();
+    let explains = |remedy: Remedy, is_opposite: &dyn Fn(&str) -> bool| {
+        let names: Vec<&str> = all.iter().copied().filter(|name| is_opposite(name)).collect();
+        let mended = || mended(case, plan, found, &names, &remedy, TRIAL_FIT_ITERATIONS);
+        !names.is_empty() && mended().is_some_and(|mended| mended.left <= FACTOR_LEAVES)
+    };
+    let several = problem.quantities().into_iter().filter(|own| !alike(problem, *own).is_empty());
+    explains(Remedy::Reverse, &|name| is_opposite(problem, name))
+        || several
+            .into_iter()
+            .any(|own| explains(Remedy::Flip(own), &|name| opposes(problem, name, |seen| seen.quantity == own)))
 }
 
 /// The other fitted outputs of the kind of this one.
