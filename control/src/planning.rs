@@ -512,8 +512,8 @@ impl Planner<'_> {
         let mut slowest: Option<(f64, &Machine)> = None;
         let begin = *first;
         let others = (0..self.machines.len()).filter(|number| *number != begin);
-        let (mut controllers, timing) =
-            (Standard::of_drives(self.design, &self.family.machine)?, Loop::new(self.design));
+        let mut controllers = Standard::of_drives(self.design, &self.family.machine)?;
+        let (mut controllers, timing) = (each(&mut controllers), Loop::new(self.design));
         let shaped = self.design.shaped(profiles);
         let until = watched_until(motion, &shaped);
         let path = SampledPath::new(shaped, timing, until);
@@ -523,9 +523,8 @@ impl Planner<'_> {
             }
             let (machine, count) = &self.machines[number];
             let (smooth, solver) = (machine.interpolating(), roughly(machine, motion));
-            let controllers = &mut each(&mut controllers);
-            let (figures, ending) =
-                closed_loop_briefly(&smooth, controllers, &timing, &path, (until, motion.window), solver)?;
+            let seen = (until, motion.window);
+            let (figures, ending) = closed_loop_briefly(&smooth, &mut controllers, &timing, &path, seen, solver)?;
             let time = arrives(profiles, &figures, ending);
             arrival.settled += if time.is_some() { *count } else { 0 };
             arrival.axes += count;

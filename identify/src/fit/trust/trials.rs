@@ -153,11 +153,9 @@ pub(crate) fn is_reversed(case: &Case, plan: &Plan, found: &Searched) -> bool {
         let mended = || mended(case, plan, found, &names, &remedy, TRIAL_FIT_ITERATIONS);
         !names.is_empty() && mended().is_some_and(|mended| mended.left <= FACTOR_LEAVES)
     };
-    let several = problem.quantities().into_iter().filter(|own| !alike(problem, *own).is_empty());
+    let mut several = problem.quantities().into_iter().filter(|own| !alike(problem, *own).is_empty());
     explains(Remedy::Reverse, &|name| is_opposite(problem, name))
-        || several
-            .into_iter()
-            .any(|own| explains(Remedy::Flip(own), &|name| opposes(problem, name, |seen| seen.quantity == own)))
+        || several.any(|own| explains(Remedy::Flip(own), &|name| opposes(problem, name, |seen| seen.quantity == own)))
 }
 
 /// The other fitted outputs of the kind of this one.
