@@ -289,6 +289,7 @@ fn balance(seen: &[(DVector<f64>, f64)]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::search::point::Options;
 
     /// A piece of second derivative I is a parabola: φ(u + d) = φ − α + g̃·d + ½ ‖d‖² for any u and d.
     #[test]
@@ -308,5 +309,48 @@ mod tests {
             let own = cost - below + gradient.dot(&d) + 0.5 * d.norm_squared();
             assert!((own - value(&(&u + &d))).abs() < 1e-12, "{k}: {own}");
         }
+    }
+
+    /// A slope that can be walked down by a thousandth of the way to its foot: there the model fails.
+    struct Walled;
+
+    impl Residuals for Walled {
+        fn rows(&self) -> usize {
+            30
+        }
+
+        fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+            r.fill(1.0);
+            r[0] = 10.0 * x[0];
+            x[0] > 0.999
+        }
+    }
+
+    /// The whole step and its halves down to 1/2048 are tried: 1/1024 succeeds, and a further 1/65536 would.
+    #[test]
+    fn a_step_is_halved_until_the_model_can_be_run() {
+        let (bounds, options) = (Bounds::none(1), Options::default());
+        let mut at = Point::new(&mut Walled, &[1.0], &bounds, &options).unwrap();
+        assert!(at.linearise(&mut Walled, &Differences::Central, None));
+        Bundle::default().climb(&mut at, &mut Walled, &mut |_, _| Flow::Continue);
+        assert!((at.best.x[0] - (1.0 - 1.0 / 1024.0)).abs() < 1e-6, "{}", at.best.x[0]);
+    }
+
+    /// Of thirty pieces, two variables leave twelve: the new one, the one that determined the last step, and those
+    /// nearest to the cost.
+    #[test]
+    fn pieces_far_from_the_cost_are_forgotten() {
+        let piece = |below: usize| Piece {
+            x: vec![below as f64],
+            y: DVector::zeros(2),
+            cost: 100.0 - below as f64,
+            gradient: DVector::zeros(2),
+        };
+        let mut pieces: Vec<Piece> = (0..30).map(piece).collect();
+        let mut weights = vec![0.0; 29];
+        weights[20] = 1.0;
+        forget(&mut pieces, &DVector::zeros(2), 100.0, &weights);
+        let kept: Vec<usize> = pieces.iter().map(|piece| piece.x[0] as usize).collect();
+        assert_eq!(kept, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 20, 29]);
     }
 }

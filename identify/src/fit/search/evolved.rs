@@ -66,3 +66,41 @@ fn evolve(at: &mut Point, problem: &mut dyn Residuals) -> bool {
     });
     best.cost < before * (1.0 - 1e-6)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::residuals::{Bounds, Differences};
+    use crate::fit::search::point::Options;
+    use crate::solve::Flow;
+
+    /// A bowl of so many variables.
+    struct Bowl(usize);
+
+    impl Residuals for Bowl {
+        fn rows(&self) -> usize {
+            2 * self.0
+        }
+
+        fn evaluate(&mut self, x: &[f64], r: &mut [f64]) -> bool {
+            r.fill(1.0);
+            r[..self.0].copy_from_slice(x);
+            true
+        }
+    }
+
+    /// An evolution takes up to 60 points for each variable, and 60 more: those of 16 variables are a thousand.
+    #[test]
+    fn many_variables_do_not_evolve() {
+        let evolved = |n: usize| {
+            let (bounds, options) = (Bounds::none(n), Options::default());
+            let mut at = Point::new(&mut Bowl(n), &vec![3.0; n], &bounds, &options).unwrap();
+            assert!(at.linearise(&mut Bowl(n), &Differences::Central, None));
+            let end = Evolved { most: 1 }.climb(&mut at, &mut Bowl(n), &mut |_, _| Flow::Continue);
+            (end, at.best.evaluations - 1)
+        };
+        let (end, points) = evolved(16);
+        assert!(end == Climb::Lowered && (100..=1020).contains(&points), "{end:?} {points}");
+        assert_eq!(evolved(17), (Climb::Passed, 0));
+    }
+}
