@@ -159,12 +159,12 @@ pub(crate) const REFIT_TOLERANCE: f64 = 0.05;
 
 /// Rows averaged into one equation of the regression, against noise in derivatives.
 ///
-/// Unit: samples. Source: chosen.
+/// Unit: samples. Source: chosen. Test: `a_thousand_rows_in_motion_make_two_hundred_equations`.
 pub(crate) const REGRESSION_BLOCK: usize = 5;
 
 /// Number of equal positions after which an axis counts as at rest, where friction is not determined.
 ///
-/// Unit: samples. Source: chosen.
+/// Unit: samples. Source: chosen. Test: `rows_at_rest_tell_nothing_of_friction`.
 pub(crate) const REST_ROWS: f64 = 20.0;
 
 /// Widths of the Gaussian for derivatives of logs; the least that keeps to the permitted noise is taken.
@@ -179,7 +179,7 @@ pub(crate) const WIDEST_IN_REGRESSION: f64 = 32.0;
 
 /// Noise permitted in the acceleration of a regression, relative to its root mean square.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `an_inertia_is_found_beside_noise`.
 pub(crate) const REGRESSION_NOISE: f64 = 0.2;
 
 /// Rows of a tall matrix that are reduced at once.
@@ -623,7 +623,8 @@ pub(crate) const LONGEST_SHIFT: isize = 500;
 
 /// Longest shift of an input that is searched for, relative to the log.
 ///
-/// Unit: 1. Source: chosen: three quarters of the log are left to compare.
+/// Unit: 1. Source: chosen: three quarters of the log are left to compare. Test:
+/// `an_input_that_is_off_by_a_fifth_of_the_log_is_found`.
 pub(crate) const SHIFT_SHARE: f64 = 0.25;
 
 /// Distance of the shifts that are tried first.

@@ -277,6 +277,92 @@ impl Balance {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::chance::normal;
+    use crate::fit::asked::problem::tests::case;
+    use rand_pcg::Pcg64;
+    use rand_pcg::rand_core::SeedableRng;
+    use std::f64::consts::{PI, TAU};
+    use std::sync::Arc;
+
+    /// Inertia, viscous and Coulomb friction, and constant torque.
+    const KNOWN: [f64; 4] = [2e-4, 2e-3, 0.05, 0.02];
+
+    /// A log of the angles `seen`, one each millisecond, while the voltage turns the drive pulley to `turned`.
+    fn logged(turned: &[f64], seen: &[f64]) -> Problem<'static> {
+        let (mut case, plan) = case(false);
+        let motor = case.machine.drives[0].motor;
+        let voltage = |k: usize| {
+            let [a, b, c] = [k.saturating_sub(1), k, (k + 1).min(turned.len() - 1)].map(|k| turned[k]);
+            let (speed, acceleration) = ((c - a) / 2e-3, (a - 2.0 * b + c) / 1e-6);
+            let sign = if speed == 0.0 { 0.0 } else { speed.signum() };
+            let torque = KNOWN[0] * acceleration + KNOWN[1] * speed + KNOWN[2] * sign + KNOWN[3];
+            torque / motor.torque_constant * motor.resistance + motor.back_emf_constant * speed
+        };
+        let log = Arc::make_mut(case.experiments[0].log.as_mut().unwrap());
+        log.time = (0..turned.len()).map(|k| 1e-3 * k as f64).collect();
+        log.inputs = vec![(0..turned.len()).map(voltage).collect()];
+        log.outputs.truncate(1);
+        log.outputs[0].values = seen.to_vec();
+        Problem::new(&case, &plan).unwrap()
+    }
+
+    /// To and fro by 5 rad, three times a second.
+    fn sway(rows: usize) -> Vec<f64> {
+        (0..rows).map(|k| 5.0 * (3e-3 * TAU * k as f64).sin()).collect()
+    }
+
+    /// Greatest relative error of the four numbers.
+    fn error(found: &Balance) -> f64 {
+        let numbers = [found.inertia, found.viscous, found.coulomb, found.load];
+        numbers.iter().zip(KNOWN).map(|(own, known)| (own / known - 1.0).abs()).fold(0.0, f64::max)
+    }
+
+    /// Ten rows at each end have no derivatives.
+    #[test]
+    fn a_thousand_rows_in_motion_make_two_hundred_equations() {
+        let turned = sway(1020);
+        let found = regression(&logged(&turned, &turned)).unwrap();
+        assert!(found.equations == 200 && error(&found) < 0.01, "{found:?}");
+    }
+
+    /// At rest friction has any value up to breakaway.
+    #[test]
+    fn rows_at_rest_tell_nothing_of_friction() {
+        // To and fro by 2 rad in 100 rows, with 40 rows of rest between.
+        let turn = |k: usize| {
+            let u = f64::min((k % 140) as f64 / 100.0, 1.0);
+            let way = 2.0 * u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
+            if k / 140 % 2 == 0 { way } else { 2.0 - way }
+        };
+        let turned: Vec<f64> = (0..1400).map(turn).collect();
+        let found = regression(&logged(&turned, &turned)).unwrap();
+        assert!(error(&found) < 0.03, "{found:?}");
+    }
+
+    /// Noise in the acceleration makes the inertia seem smaller, by its share in the mean square.
+    #[test]
+    fn an_inertia_is_found_beside_noise() {
+        let (turned, mut random) = (sway(2000), Pcg64::seed_from_u64(1));
+        let seen: Vec<f64> = turned.iter().map(|angle| angle + 0.044 * normal(&mut random)).collect();
+        let found = regression(&logged(&turned, &seen)).unwrap();
+        assert!((found.inertia / KNOWN[0] - 1.0).abs() < 0.08, "{found:?}");
+    }
+
+    /// A sweep of 560 rows between 220 rows of rest.
+    #[test]
+    fn an_input_that_is_off_by_a_fifth_of_the_log_is_found() {
+        let turn = |k: usize| {
+            let u = ((k as f64 - 220.0) / 560.0).clamp(0.0, 1.0);
+            5.0 * (PI * u).sin().powi(2) * (TAU * (2.0 * u + 4.0 * u * u)).sin()
+        };
+        let turned: Vec<f64> = (0..1000).map(turn).collect();
+        let mut problem = logged(&turned, &turned);
+        let (name, voltage) = (problem.runs[0].name.clone(), problem.runs[0].logged[0].clone());
+        for early in [200, -200] {
+            problem.runs[0].logged[0] = (0..1000).map(|k: isize| voltage[(k + early).clamp(0, 999) as usize]).collect();
+            assert_eq!(suspected_shift(&problem, &name), Some(early));
+        }
+    }
 
     #[test]
     fn derivatives_of_a_parabola_are_exact() {
