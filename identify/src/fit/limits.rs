@@ -813,7 +813,7 @@ pub(crate) const HELD_OUT_ROWS: usize = 20;
 
 /// R̂ above which a chain does not count as converged.
 ///
-/// Unit: 1. Source: A. Vehtari and others 2021.
+/// Unit: 1. Source: A. Vehtari and others 2021. Test: `a_posterior_is_doubted_from_one_per_cent_on`.
 pub const R_HAT: f64 = 1.01;
 
 /// Effective draws below which a posterior does not count as converged.
@@ -824,7 +824,7 @@ pub const EFFECTIVE: f64 = 400.0;
 
 /// Share of divergent transitions that is not reported.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `a_posterior_is_doubted_from_one_per_cent_on`.
 pub(crate) const DIVERGING: f64 = 0.01;
 
 /// Distance from which on a bound does not cut off what is integrated over.
@@ -846,17 +846,17 @@ pub(crate) const FELT: f64 = 1e3;
 
 /// Error of the slopes from the fit's Jacobian, relative to that of a standard error, above which they are not used.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `slopes_that_are_off_by_half_are_not_used`.
 pub(crate) const SLOPES_OFF: f64 = 0.3;
 
 /// Maximum number of variables for which derivatives of the Jacobian are measured.
 ///
-/// Unit: variables. Source: cost.
+/// Unit: variables. Source: cost. Test: `paths_of_few_variables_are_bent_as_the_model_is`.
 pub(crate) const MOST_BENT: usize = 16;
 
 /// Places at which the slopes are compared.
 ///
-/// Unit: points. Source: chosen.
+/// Unit: points. Source: chosen. Test: `slopes_are_compared_for_the_price_of_six_jacobians`.
 pub(crate) const SLOPE_PLACES: usize = 6;
 
 /// Maximum number of chains; each is a thread.
@@ -876,7 +876,7 @@ pub(crate) const LARGEST_ERROR: f64 = 1000.0;
 
 /// Maximum doublings of a path, which then has 2 to this many steps.
 ///
-/// Unit: doublings. Source: Stan's default.
+/// Unit: doublings. Source: Stan's default. Test: `a_path_that_does_not_turn_ends_after_a_thousand_steps`.
 pub(crate) const MOST_DOUBLINGS: usize = 10;
 
 /// δ: acceptance at which the step size aims.
@@ -886,7 +886,7 @@ pub(crate) const ACCEPTANCE: f64 = 0.8;
 
 /// Steps of a random walk for a draw, for each variable.
 ///
-/// Unit: steps. Source: chosen.
+/// Unit: steps. Source: chosen. Test: `draws_of_a_walk_are_nearly_independent`.
 pub(crate) const WALK_STEPS: usize = 3;
 
 /// Length of a step of a random walk, times √n.

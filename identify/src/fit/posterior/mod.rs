@@ -344,9 +344,8 @@ fn priors<'a>(scales: &'a [Scale<'a>], plan: &Plan, bounds: &mut Bounds) -> Resu
 mod tests {
     use super::*;
 
-    /// Draws that are not told apart from converged ones, but for one variable.
-    #[test]
-    fn the_worst_variable_is_named() {
+    /// The doubts about 2000 draws of variables with these R̂ and effective draws.
+    fn doubts_of(all: &[(&str, f64, f64)], divergences: u64) -> Vec<String> {
         let credible = |(name, r_hat, effective): (&str, f64, f64)| Credible {
             name: name.into(),
             unit: "",
@@ -357,12 +356,16 @@ mod tests {
             r_hat,
             effective,
         };
-        let doubts = |all: &[(&str, f64, f64)]| {
-            let chains = vec![vec![vec![0.0; all.len()]; 500]; 4];
-            let draws = Draws { chains, divergences: 0, evaluations: 0, interrupted: false };
-            let variables = all.iter().copied().map(credible).collect();
-            Posterior { variables, globals: all.len(), draws, inflation: 1.0, fixed_slopes: false }.doubts()
-        };
+        let chains = vec![vec![vec![0.0; all.len()]; 500]; 4];
+        let draws = Draws { chains, divergences, evaluations: 0, interrupted: false };
+        let variables = all.iter().copied().map(credible).collect();
+        Posterior { variables, globals: all.len(), draws, inflation: 1.0, fixed_slopes: false }.doubts()
+    }
+
+    /// Draws that are not told apart from converged ones, but for one variable.
+    #[test]
+    fn the_worst_variable_is_named() {
+        let doubts = |all: &[(&str, f64, f64)]| doubts_of(all, 0);
         assert_eq!(doubts(&[("a", 1.0, 2000.0), ("b", 1.001, 1500.0)]), Vec::<String>::new());
         let bad = [("a", 1.0, 2000.0), ("b", 1.5, 900.0), ("c", 1.2, 3.0), ("d", 1.0, 1000.0)];
         for shift in 0..bad.len() {
@@ -374,5 +377,14 @@ mod tests {
         }
         // A number that cannot be computed is worse than any.
         assert!(doubts(&[("a", 1.5, 2000.0), ("b", f64::NAN, 1500.0)])[0].contains("of b is NaN"));
+    }
+
+    /// Chains that differ by half a per cent, or one divergent transition in 200, are as good as any.
+    #[test]
+    fn a_posterior_is_doubted_from_one_per_cent_on() {
+        let doubts = |r_hat: f64, divergences: u64| doubts_of(&[("a", r_hat, 2000.0)], divergences);
+        assert_eq!(doubts(1.005, 10), Vec::<String>::new());
+        assert_eq!(doubts(1.02, 10), ["R\u{302} of a is 1.020, above 1.01"]);
+        assert_eq!(doubts(1.005, 40), ["40 of 2000 transitions were divergent"]);
     }
 }

@@ -279,4 +279,13 @@ mod tests {
             assert!((1e-3..0.1).contains(&chain.step), "{begun}: {}", chain.step);
         }
     }
+
+    /// Steps of a ten thousandth of the width of the distribution; one evaluation is that of the start.
+    #[test]
+    fn a_path_that_does_not_turn_ends_after_a_thousand_steps() {
+        let mut chain = Chain::new(&standard, &|| true, &[3e-3, -1e-2], Pcg64::seed_from_u64(2)).unwrap();
+        chain.step = 1e-6;
+        assert!(chain.draw().is_some() && !chain.diverged);
+        assert_eq!(chain.evaluations, 1 + 1023);
+    }
 }

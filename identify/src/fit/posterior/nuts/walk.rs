@@ -142,4 +142,17 @@ mod tests {
         let told = walk(&|_| None, &[vec![0.0]], effort, &|_| true).unwrap_err().to_string();
         assert_eq!(told, "the density is zero where a chain would start\n  next: start from a fit that has converged");
     }
+
+    /// A step is worth a third of a draw of one variable: nine steps for a draw of three variables, and not a third of
+    /// that or three times as many.
+    #[test]
+    fn draws_of_a_walk_are_nearly_independent() {
+        let density = |q: &[f64]| Some(-0.5 * q.iter().map(|q| q * q).sum::<f64>());
+        let effort = Effort { draws: 2000, ..Effort::default() };
+        let draws = walk(&density, &[vec![0.1; 3]], effort, &|_| true).unwrap();
+        for j in 0..3 {
+            let share = draws.effective(j) / 8000.0;
+            assert!((0.55..0.95).contains(&share), "{share}");
+        }
+    }
 }
