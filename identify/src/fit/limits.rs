@@ -23,13 +23,14 @@ pub(crate) const STARTS_MOVING: f64 = 5.0;
 
 /// Standard deviation of noise that neighbouring values share, relative to what they differ by.
 ///
-/// Unit: 1. Source: noise of first order with a time constant of 30 samples.
+/// Unit: 1. Source: noise of first order with a time constant of 30 samples. Test:
+/// `a_wrong_model_does_not_make_its_start_doubtful`.
 pub(crate) const SLOW_BY_DIFFERENCE: f64 = 5.0;
 
 /// Deviation of a sample time from an even raster up to which the solver answers at the raster's time. The error of a
 /// value is at most its rate of change times this share of an interval.
 ///
-/// Unit: sample intervals. Source: chosen.
+/// Unit: sample intervals. Source: chosen. Test: `times_with_microseconds_are_even`.
 pub(crate) const EVEN_RASTER: f64 = 1e-3;
 
 /// Minimum up and down steps (and per 100 samples) for a resting signal to count as dithering.
@@ -934,7 +935,7 @@ pub(crate) const CHANGE_ALIKE: f64 = 0.02;
 
 /// Share of a held-out log to which its start is fitted; the rest is predicted.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `the_start_of_a_block_is_fitted_to_its_first_tenth`.
 pub(crate) const START_SHARE: f64 = 0.1;
 
 /// Maximum Jacobians of the fit of a law to all logs.
@@ -975,7 +976,7 @@ pub(crate) const STRIBECK_FALL: f64 = 0.05;
 
 /// Deflection of bristles at which a search begins.
 ///
-/// Unit: m of the cart. Source: chosen.
+/// Unit: m of the cart. Source: chosen. Test: `bristles_begin_as_stiff_at_the_pulley_as_at_the_cart`.
 pub(crate) const BRISTLE_BEND: f64 = 2e-5;
 
 // design: the best experiment

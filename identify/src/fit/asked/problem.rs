@@ -1007,4 +1007,21 @@ pub(crate) mod tests {
             assert!((found / (0.1 * force) - 1.0).abs() < 1e-12, "{share}: {found} {force}");
         }
     }
+
+    /// A first value is as far off as the others, as long as that may be noise that neighbours share. What is further
+    /// off is an error of the model, unless it swings.
+    #[test]
+    fn a_wrong_model_does_not_make_its_start_doubtful() {
+        let (case, plan) = case(false);
+        for (times, swings, known) in [(0.5, false, 1.0), (3.0, false, 3.0), (100.0, false, 5.0), (100.0, true, 100.0)]
+        {
+            let mut problem = Problem::new(&case, &plan).unwrap();
+            problem.swings = swings;
+            let noise = problem.noise().deviation(Quantity::DriveAngle);
+            problem.doubt_starts(&[(Quantity::DriveAngle, times * noise)]);
+            let start = problem.runs[0].extras.iter().find(|extra| extra.what == Nuisance::StartPosition(0)).unwrap();
+            let found = start.known.unwrap() / start.unit;
+            assert!((found - known).abs() < 1e-9, "{times} {swings}: {found}");
+        }
+    }
 }

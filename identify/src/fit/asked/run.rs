@@ -728,6 +728,7 @@ pub fn rounding_at_rest(step: f64, deviation: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::case::TEMPLATE;
+    use crate::fit::asked::problem::tests::case;
     use crate::log::Output;
     use crate::signal::Hold;
     use crate::solve::simulate;
@@ -810,5 +811,17 @@ mod tests {
         for t in [0.0, 0.2, 0.77, 1.9, 2.0] {
             assert!((between(&values, &slopes, t / h, h) - f(t)).abs() < 1e-12);
         }
+    }
+
+    /// A clock that is 0.03 % fast, in a file with microseconds or with steps of 5 µs.
+    #[test]
+    fn times_with_microseconds_are_even() {
+        let (case, _) = case(false);
+        let is_even = |digit: f64| {
+            let mut log = (**case.experiments[0].log.as_ref().unwrap()).clone();
+            log.time = (0..log.time.len()).map(|k| digit * (1.000_314e-3 * k as f64 / digit).round()).collect();
+            FittedLog::all(&case.experiments[0], &log, &LogOptions::default())[0].is_even()
+        };
+        assert!(is_even(1e-6) && !is_even(5e-6));
     }
 }

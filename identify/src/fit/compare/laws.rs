@@ -392,4 +392,19 @@ mod tests {
         let (own, plan) = with(&case, "axis.toml".as_ref(), &given, FrictionLaw::LuGre, false, &case.machine).unwrap();
         assert_eq!(Free::new(&own.machine, &key, &[], &plan.bounds).unwrap().high, 9.0 * coulomb);
     }
+
+    /// Coulomb friction bends bristles by 20 µm along the belt, at the cart as at the pulley.
+    #[test]
+    fn bristles_begin_as_stiff_at_the_pulley_as_at_the_cart() {
+        let text = format!("{TEMPLATE}\n[fit]\nfree = [\"cart.mass\"]\n");
+        let case = Case::from_text("axis.toml", &text).unwrap();
+        for (body, arm) in [("cart", 1.0), ("drive_pulley", case.machine.pulley_radius)] {
+            let plan = Plan { free: vec![format!("{body}.friction.coulomb")], ..Plan::default() };
+            let (own, _) = with(&case, "axis.toml".as_ref(), &plan, FrictionLaw::LuGre, false, &case.machine).unwrap();
+            let [coulomb, stiffness] = ["coulomb", "lugre.stiffness"]
+                .map(|key| Free::new(&own.machine, &format!("{body}.friction.{key}"), &[], &[]).unwrap().start);
+            let bend = arm * coulomb / stiffness;
+            assert!((bend / 20e-6 - 1.0).abs() < 1e-9, "{body}: {bend}");
+        }
+    }
 }

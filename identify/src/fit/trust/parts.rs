@@ -162,3 +162,33 @@ fn cut(experiment: &Experiment, rows: Range<usize>) -> Option<Experiment> {
         log: Some(Arc::new(own)),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::problem::tests::case;
+    use crate::solve::{Solver, simulate};
+
+    /// A sensor that slips after a fifth of the block is an error of what is predicted, and does not move the start.
+    #[test]
+    fn the_start_of_a_block_is_fitted_to_its_first_tenth() {
+        let (mut case, plan) = case(false);
+        case.experiments[0].every = 1e-3;
+        let run = simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap().trajectory;
+        let logged = |slip: f64| {
+            let mut own = case.experiments[0].clone();
+            let log = Arc::make_mut(own.log.as_mut().unwrap());
+            let column = |name: &str| run.get(name).unwrap().to_vec();
+            (log.time, log.inputs) = (column("time"), vec![column("voltage")]);
+            log.outputs.retain(|output| output.quantity == Quantity::CartPosition);
+            let seen = |(k, x): (usize, f64)| x + 1e-6 * (2.1 * k as f64).sin() + if k < 100 { 0.0 } else { slip };
+            log.outputs[0].values = column("cart_position").into_iter().enumerate().map(seen).collect();
+            own
+        };
+        let fold = Fold { fitted: vec![logged(0.0)], held_out: vec![logged(1e-3)] };
+        let (found, _) = errors(&case, &plan, &fold, (true, &Effort::compared(None)), None).unwrap();
+        let (_, squares, count) = found[0];
+        // 401 values are off by a millimetre.
+        assert!(count == 501 && (squares / 401e-6 - 1.0).abs() < 0.02, "{found:?}");
+    }
+}
