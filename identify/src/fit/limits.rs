@@ -140,7 +140,7 @@ pub(crate) const FIRM: f64 = 1e-3;
 
 /// Maximum rounds in which weights are estimated from the residuals.
 ///
-/// Unit: rounds. Source: chosen.
+/// Unit: rounds. Source: chosen. Test: `weights_agree_with_the_residuals_that_they_lead_to`.
 pub(crate) const WEIGHT_ROUNDS: usize = 4;
 
 /// Maximum Jacobians of a start other than the first, before the best of them goes on.

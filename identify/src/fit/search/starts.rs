@@ -667,4 +667,20 @@ mod tests {
         }
         assert!((times_noise(&problem, &at) - 3.0).abs() < 1e-9, "{}", times_noise(&problem, &at));
     }
+
+    /// Each sensor is weighed by its residuals, which depend on the weights: the first ones are those of a fit that
+    /// believes both sensors alike.
+    #[test]
+    fn weights_agree_with_the_residuals_that_they_lead_to() {
+        let (mut case, plan) = case(false);
+        // The position is in a slightly wrong unit, and has less noise than the angle.
+        let log = Arc::make_mut(case.experiments[0].log.as_mut().unwrap());
+        log.outputs[1].values.iter_mut().for_each(|position| *position *= 1.005);
+        let effort = Effort { options: Options::default(), is_straight: false, is_short: false, delay: None };
+        let found = search_as_far(&case, &plan, None, &effort, &mut |_, _| Flow::Continue).unwrap();
+        let left = noise_of(&found.problem, &found.best, false);
+        for ((quantity, weighed), (_, left)) in found.noise.iter().zip(&left) {
+            assert!((weighed / left - 1.0).abs() < 0.05, "{}: {weighed} {left}", quantity.name());
+        }
+    }
 }
