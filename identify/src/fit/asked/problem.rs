@@ -944,8 +944,12 @@ pub(crate) mod tests {
 
     /// A pulse of the template with a deviating log, its angle and position with or without an offset.
     pub(crate) fn case(is_off: bool) -> (Case, Plan) {
-        let rows = ["experiment.0.every=10ms", "experiment.0.until=0.5s"];
-        let mut case = Case::from_text_with("axis.toml", TEMPLATE, &rows).unwrap();
+        logged(&["experiment.0.every=10ms", "experiment.0.until=0.5s"], is_off)
+    }
+
+    /// The same of the template with these changes.
+    pub(crate) fn logged(changes: &[&str], is_off: bool) -> (Case, Plan) {
+        let mut case = Case::from_text_with("axis.toml", TEMPLATE, changes).unwrap();
         case.experiments.truncate(1);
         let run = simulate(&case.machine, &case.experiments[0], Solver::Exact).unwrap().trajectory;
         let column = |name: &str| run.get(name).unwrap().to_vec();

@@ -636,9 +636,16 @@ fn noise_of(problem: &Problem, at: &Minimum, robust: bool) -> Vec<(Quantity, f64
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::fit::asked::problem::tests::case;
+
+    /// A search that ended at the values of the case.
+    pub(crate) fn at_start(mut problem: Problem) -> Searched {
+        let (start, bounds, noise) = (problem.start(), problem.bounds(), problem.noise().0);
+        let best = Minimum::linearised(&mut problem, &start, &bounds).unwrap();
+        Searched { problem, best, noise, starts: Vec::new(), work: Work::default() }
+    }
 
     #[test]
     fn efforts_add_up() {

@@ -88,3 +88,15 @@ fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
     let r = shortened(&ordered).qr().unpack_r();
     Some(r.view((all - n, all - n), (n, n)).into_owned())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of forty parameters, more than most fits have.
+    #[test]
+    fn a_decomposition_takes_a_hundredth_of_the_iterations_that_it_may() {
+        let columns = DMatrix::from_fn(40, 40, |i, j| ((i * i + 3 * j * j + i * j) as f64).sin());
+        assert!(SVD::try_new(columns, false, true, 1e-15, MOST_SWEEPS / 100).is_some());
+    }
+}

@@ -381,8 +381,14 @@ impl Balance {
 
 #[cfg(test)]
 mod tests {
+    use super::super::doubts::Size;
+    use super::super::result::result;
     use super::*;
     use crate::case::TEMPLATE;
+    use crate::fit::asked::problem::Problem;
+    use crate::fit::asked::problem::tests::case;
+    use crate::fit::search::starts::tests::at_start;
+    use nalgebra::DMatrix;
 
     /// An output at the end of its range is an end stop, if the machine has one; an input is none.
     #[test]
@@ -403,5 +409,60 @@ mod tests {
         assert!(graded(&[], "input") == Grade::Warning);
         assert!(graded(&stops, "cart_position") == Grade::Note);
         assert!(graded(&stops, "input") == Grade::Warning);
+    }
+
+    /// A stop on a kink leaves what one standard error may be off by anyway; above that the result is no minimum.
+    #[test]
+    fn a_search_that_stalls_far_from_a_minimum_is_a_warning() {
+        let (case, plan) = case(false);
+        let mut fit = result(&at_start(Problem::new(&case, &plan).unwrap()), None);
+        fit.ending = Ending::Stalled;
+        let mut told = |decrement: f64| {
+            fit.decrement = decrement;
+            let all = of_search(&fit);
+            (all[0].grade, all[0].code)
+        };
+        assert_eq!(told(1.5), (Grade::Note, "kink"));
+        assert_eq!(told(3.0), (Grade::Warning, "slope"));
+    }
+
+    #[test]
+    fn an_estimate_that_a_cause_moves_by_two_per_cent_is_told() {
+        let (case, plan) = case(false);
+        let mut fit = result(&at_start(Problem::new(&case, &plan).unwrap()), None);
+        let own = fit.estimates[0].value;
+        let mut told = |moved: f64| {
+            let with = Size { name: "a".into(), unit: "N s/m", value: moved * own, error: 0.1 };
+            fit.cause = Some(Cause {
+                key: "drag",
+                words: "drag".into(),
+                explained: 0.5,
+                standard_errors: 9.0,
+                parameters: Vec::new(),
+                estimates: vec![Some(with)],
+                belts: None,
+                times_noise: 1.0,
+                add: "add it".into(),
+                better: [4, 4],
+                added: DMatrix::zeros(1, 1),
+            });
+            of_cause(&fit).unwrap().text
+        };
+        assert!(told(1.02).contains("cart.friction.viscous is then"), "{}", told(1.02));
+        assert!(told(0.995).contains("no estimate moves by a hundredth"), "{}", told(0.995));
+    }
+
+    /// The reason is looked for by fits, which are not made here.
+    #[test]
+    fn a_log_of_which_less_than_half_is_explained_is_a_warning() {
+        let (case, plan) = case(false);
+        let mut found = at_start(Problem::new(&case, &plan).unwrap());
+        let mut fit = result(&found, None);
+        found.problem = found.problem.stopped_by(Some(&|| true));
+        let mut told = |percent: f64| {
+            fit.logs[0].outputs[0].fitted.as_mut().unwrap().percent = percent;
+            of_residuals(&case, &plan, &found, &fit, &[]).len()
+        };
+        assert_eq!([30.0, 45.0, 55.0, 80.0].map(&mut told), [1, 1, 0, 0]);
     }
 }

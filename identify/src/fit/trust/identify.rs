@@ -356,3 +356,37 @@ pub(crate) fn listed(names: &[&str]) -> String {
         [first @ .., last] => format!("{} and {last}", first.join(", ")),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::problem::tests::case;
+    use crate::fit::search::starts::tests::at_start;
+
+    /// A machine follows no model to a fifth of the rounding of its converter, nor to a share of 2 in 10 000 of the
+    /// range: averages over noise tell nothing below that.
+    #[test]
+    fn what_moves_the_outputs_less_than_a_machine_can_show_is_not_determined() {
+        let (case, plan) = case(false);
+        let found = at_start(Problem::new(&case, &plan).unwrap());
+        let rows = (found.problem.counted() as f64).sqrt();
+        // What is said where a change by 100 % moves the outputs by this, in their weights.
+        let told = |problem: &Problem, by: f64| {
+            let (jacobian, x) = (&found.best.jacobian, &found.best.x);
+            let whole = Identifiability::new(problem, jacobian, x, 1.0).unwrap().singular[0] / rows;
+            let known = Identifiability::new(problem, &(jacobian * (by / whole)), x, 1e-9).unwrap();
+            known.groups.first().map_or(String::new(), |group| group.words.clone())
+        };
+        let weighted = |seen: &MeasuredOutput| seen.weights[0] * extent(&seen.values);
+        let range = weighted(&found.problem.runs[0].seen[0]);
+        let smooth = [1e-4, 3e-4].map(|share| told(&found.problem, share * range));
+        assert!(smooth[0].contains("of their range") && smooth[1].is_empty(), "{smooth:?}");
+        let mut stepped = found.problem.clone();
+        for seen in &mut stepped.runs[0].seen {
+            seen.step = extent(&seen.values);
+        }
+        let rounding = range / 12f64.sqrt();
+        let rounded = [0.15, 0.25].map(|share| told(&stepped, share * rounding));
+        assert!(rounded[0].contains("a fifth of their resolution") && rounded[1].is_empty(), "{rounded:?}");
+    }
+}

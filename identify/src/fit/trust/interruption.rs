@@ -29,12 +29,15 @@ pub(super) fn interruptions(case: &Case, plan: &Plan, found: &Searched) -> Vec<F
     if found.times_noise().all(|(_, times)| times <= UNEXPLAINED_NOISE) {
         return Vec::new();
     }
-    let runs = &found.problem.runs;
+    by_windows(case, plan, found, window(&found.problem.runs)).unwrap_or_default()
+}
+
+/// Length of the windows, s.
+fn window(runs: &[FittedLog]) -> f64 {
     let total: f64 = runs.iter().map(FittedLog::length).sum();
     let samples = runs.iter().map(|run| run.time.len()).sum::<usize>() as f64;
     let longest = runs.iter().map(FittedLog::length).fold(0.0, f64::max);
-    let window = (longest / INTERRUPTED_WINDOWS).max(WINDOW_SAMPLES * total / samples);
-    by_windows(case, plan, found, window).unwrap_or_default()
+    (longest / INTERRUPTED_WINDOWS).max(WINDOW_SAMPLES * total / samples)
 }
 
 /// Residuals in windows of this length, s, and what stands out.
@@ -86,4 +89,33 @@ fn interruption(name: &str, windows: &[(f64, f64)], length: f64) -> Option<Findi
         significant(largest / usual, 2)
     );
     Some(Finding { grade: Grade::Warning, code: "interruption", log: Some(name.to_string()), text })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::problem::Problem;
+    use crate::fit::asked::problem::tests::case;
+
+    /// Short windows show short parts, but too few samples fit any start.
+    #[test]
+    fn a_long_log_has_24_windows_and_a_short_one_windows_of_100_samples() {
+        let (case, plan) = case(false);
+        let mut runs = Problem::new(&case, &plan).unwrap().runs;
+        let mut count = |samples: u32| {
+            runs[0].time = (0..samples).map(|k| 1e-3 * f64::from(k)).collect();
+            (runs[0].length() / window(&runs)).round()
+        };
+        assert_eq!([20_000, 4800, 1200, 300].map(&mut count), [24.0, 24.0, 12.0, 3.0]);
+    }
+
+    #[test]
+    fn a_part_that_is_off_is_an_interruption_up_to_a_quarter_of_the_log() {
+        let told = |off: u32| {
+            let windows: Vec<_> = (0..24).map(|k| (f64::from(k), if k < off { 50.0 } else { 2.0 })).collect();
+            interruption("a", &windows, 1.0).map(|finding| finding.text)
+        };
+        assert!(told(6).is_some_and(|text| text.contains("from 0 s to 6 s")), "{:?}", told(6));
+        assert!(told(0).is_none() && told(7).is_none(), "{:?}", told(7));
+    }
 }

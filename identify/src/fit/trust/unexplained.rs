@@ -233,3 +233,29 @@ fn factor(case: &Case, plan: &Plan, found: &Searched, quantity: Quantity, names:
     let factor = rounded(factor);
     Some(format!("with {column} times {factor}{what} {left}: set its unit, or scale = {{ {column} = {factor} }}"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::problem::tests::logged;
+    use crate::fit::search::starts::tests::at_start;
+    use std::sync::Arc;
+
+    /// The cart and its pulley go to and fro, and creep beside that: windows have starts of their own, but no creep.
+    #[test]
+    fn errors_that_add_up_along_a_log_are_told_from_those_within_windows() {
+        let changes = ["belt={ model = \"rigid\" }", "experiment.0.input={ sine = \"5 V\", frequency = \"8 Hz\" }"];
+        let (case, plan) = logged(&changes, false);
+        let told = |creep: f64| {
+            let mut case = case.clone();
+            let log = Arc::make_mut(case.experiments[0].log.as_mut().unwrap());
+            for (output, arm) in log.outputs.iter_mut().zip([case.machine.pulley_radius, 1.0]) {
+                output.values.iter_mut().zip(&log.time).for_each(|(value, t)| *value += creep * t / arm);
+            }
+            let found = at_start(Problem::new(&case, &plan).unwrap());
+            windows(&case, &plan, &found, Quantity::CartPosition)
+        };
+        assert!(told(2e-3).is_some_and(|text| text.contains("in windows of 0.25 s")), "{:?}", told(2e-3));
+        assert_eq!(told(12e-3), None);
+    }
+}
