@@ -293,3 +293,56 @@ fn round(
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::problem::tests::logged;
+    use crate::fit::search::starts::tests::at_start;
+
+    /// Of a rigid axis only the total inertia is determined: a search for its parts from `start`, and from its end
+    /// towards `given`, with the effort of that.
+    fn approached(start: &[f64], given: impl Fn(&Judged, &[f64]) -> Vec<f64>) -> (Searched<'static>, Vec<f64>, Work) {
+        let changes = ["belt={ model = \"rigid\" }", "experiment.0.every=10ms", "experiment.0.until=0.5s"];
+        let (case, plan) = logged(&changes, false);
+        let free = ["cart.mass", "drive_pulley.inertia"].map(String::from).to_vec();
+        let mut found = at_start(Problem::new(&case, &Plan { free, ..plan }).unwrap());
+        let Searched { problem, best, .. } = &mut found;
+        let (bounds, mut x, mut work) = (problem.bounds(), best.x.clone(), Work::default());
+        x[..2].copy_from_slice(start);
+        let options = Options { rounding: problem.rounding(), ..Options::default() };
+        *best = minimise(problem, &x, &bounds, &options, &mut |_, _| Flow::Continue);
+        let judged = Judged::new(problem, &best.residuals, &best.jacobian, &best.x, &vec![false; x.len()]).unwrap();
+        let given = given(&judged, &best.x);
+        let all = nearest(problem, best, &given, (&options, Pull::WHOLE), &mut |_, _| Flow::Continue, &mut work);
+        assert!(all.is_none());
+        (found, given, work)
+    }
+
+    /// Of logarithms a and b with a known sum A eᵃ + B eᵇ, the nearest ones are on its gradient through those given.
+    #[test]
+    fn a_curved_set_is_approached_in_rounds() {
+        let (found, given, _) = approached(&[-1.0, 0.0], |_, x| x.iter().map(|_| -f64::ln(2.0)).collect());
+        let (x, machine) = (&found.best.x, found.problem.stage_at(&found.best.x));
+        let [way, gradient] = [
+            (x[1] - given[1]) / (x[0] - given[0]),
+            machine.drive_pulley.inertia / (machine.cart.mass * machine.pulley_radius.powi(2)),
+        ];
+        // 120 % after the first round, 60 % after the second.
+        assert!((way / gradient - 1.0).abs() < 0.3, "{x:?}: {way} {gradient}");
+    }
+
+    /// The next one would lead nowhere.
+    #[test]
+    fn no_round_follows_one_that_hardly_moved() {
+        let steps = |far: f64| {
+            let beside = |judged: &Judged, x: &[f64]| {
+                let lost = judged.identifiability.lost.column(0);
+                let moved = |j: usize| if j < 2 { far * lost[j] / lost.amax() } else { 0.0 };
+                x.iter().enumerate().map(|(j, x)| x + moved(j)).collect::<Vec<f64>>()
+            };
+            approached(&[0.0, 0.0], beside).2.iterations
+        };
+        assert!(steps(1.4e-3) > steps(0.7e-3));
+    }
+}

@@ -223,21 +223,14 @@ pub(crate) fn other_law(found: &Searched, judged: &Judged) -> Option<OtherLaw> {
     if candidates.is_empty() {
         return None;
     }
-    let free: Vec<usize> = (0..best.x.len()).filter(|&j| !best.at_bound[j]).collect();
-    let jacobian = best.jacobian.select_columns(&free);
-    let inverse = inverse_of_square(&jacobian)?;
-    let residuals = DVector::from_column_slice(&best.residuals);
-    let place = EndOfFit { problem, x: &best.x, free, residuals, jacobian, inverse };
+    let place = EndOfFit::new(found)?;
     let tried = candidates.into_iter().filter_map(|candidate| place.attempt(candidate, candidate.first()));
-    let mut tried = tried.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
+    let tried = tried.max_by(|a, b| a.gain.total_cmp(&b.gain))?;
     // Independent residuals must show it, too.
     if tried.gain.sqrt() < LAW_SHOWN * judged.covariance.deviation {
         return None;
     }
-    for _ in 1..LAW_ROUNDS {
-        tried = place.attempt(tried.candidate, tried.amplitude)?;
-    }
-    place.judged(&tried, judged)
+    place.judged(&place.again(tried)?, judged)
 }
 
 /// Laws to try: for bodies with free friction of Coulomb's law.
@@ -288,7 +281,16 @@ fn fastest(problem: &Problem, x: &[f64], body: Body) -> f64 {
     most
 }
 
-impl EndOfFit<'_> {
+impl<'a> EndOfFit<'a> {
+    fn new(found: &'a Searched<'a>) -> Option<Self> {
+        let (problem, best) = (&found.problem, &found.best);
+        let free: Vec<usize> = (0..best.x.len()).filter(|&j| !best.at_bound[j]).collect();
+        let jacobian = best.jacobian.select_columns(&free);
+        let inverse = inverse_of_square(&jacobian)?;
+        let residuals = DVector::from_column_slice(&best.residuals);
+        Some(Self { problem, x: &best.x, free, residuals, jacobian, inverse })
+    }
+
     /// The residuals at `x` with this amplitude of a law; `None` if the model fails with it.
     fn with(&self, candidate: Candidate, amplitude: f64, x: &[f64]) -> Option<DVector<f64>> {
         let mut residuals = vec![0.0; self.residuals.len()];
@@ -355,6 +357,14 @@ impl EndOfFit<'_> {
         Some(Tried { candidate, amplitude: amplitude.clamp(least, most), column, along, gain })
     }
 
+    /// A law whose column is taken again at its amplitude.
+    fn again(&self, mut tried: Tried) -> Option<Tried> {
+        for _ in 1..LAW_ROUNDS {
+            tried = self.attempt(tried.candidate, tried.amplitude)?;
+        }
+        Some(tried)
+    }
+
     /// Judges a law against noise, with the columns of fit and law together.
     fn judged(&self, tried: &Tried, judged: &Judged) -> Option<OtherLaw> {
         let (g, n) = (self.problem.globals(), self.jacobian.ncols());
@@ -394,6 +404,11 @@ impl EndOfFit<'_> {
 mod tests {
     use super::*;
     use crate::case::{Case, TEMPLATE};
+    use crate::fit::asked::problem::tests::case;
+    use crate::fit::search::starts::tests::at_start;
+    use crate::signal::Signal;
+
+    const DRIFT: Candidate = Candidate { body: Body::Cart, kind: AlternativeLaw::Drift, coulomb: 0.2 };
 
     /// Friction that drifts rises along a log, one that sways rises first, and one with sides is larger forward.
     #[test]
@@ -415,5 +430,51 @@ mod tests {
             assert!(is(coulomb(AlternativeLaw::Sway, share), [factor * own; 2]), "{share}");
         }
         assert!(is(coulomb(AlternativeLaw::Sided, 0.3), [own + 0.1, own - 0.1]));
+    }
+
+    /// The end of a fit to a log whose input is sampled.
+    fn sampled() -> Searched<'static> {
+        let (mut case, plan) = case(false);
+        let log = case.experiments[0].log.clone().unwrap();
+        let (times, values) = (log.time.clone(), log.inputs[0].clone());
+        case.experiments[0].inputs[0] = Signal::Sampled { times, values, hold: log.hold };
+        at_start(Problem::new(&case, &plan).unwrap())
+    }
+
+    /// Friction that drifts with every sample of the log moves the cart as that of ten segments.
+    #[test]
+    fn friction_that_drifts_in_segments_moves_a_cart_as_one_that_drifts_with_time() {
+        let found = sampled();
+        let (place, run) = (EndOfFit::new(&found).unwrap(), &found.problem.runs[0]);
+        let stage = |k: usize| {
+            let mut machine = found.problem.machine.clone();
+            DRIFT.put(&mut machine, 0.5, (k as f64 + 0.5) / 50.0);
+            machine
+        };
+        let stages: Vec<Machine> = (0..50).map(stage).collect();
+        let mut known = place.residuals.clone();
+        assert!(drifting::residuals(run, &stages, &found.problem.extras_of(0, place.x), known.as_mut_slice()));
+        let off = place.with(DRIFT, 0.5, place.x).unwrap() - &known;
+        let share = off.norm() / (known.clone() - &place.residuals).norm();
+        assert!(share < 0.01, "{share}");
+    }
+
+    /// Friction that rises threefold along a log moves a cart out of proportion to its amplitude.
+    #[test]
+    fn the_amplitude_of_a_law_is_found_though_its_effect_bends() {
+        let mut found = sampled();
+        let moved = EndOfFit::new(&found).unwrap().with(DRIFT, 0.5, &found.best.x).unwrap();
+        let run = &mut found.problem.runs[0];
+        for (seen, moved) in run.seen.iter_mut().zip(moved.as_slice().chunks(run.time.len())) {
+            for ((value, weight), moved) in seen.values.iter_mut().zip(&seen.weights).zip(moved) {
+                *value += moved / weight;
+            }
+        }
+        let found = at_start(found.problem);
+        let place = EndOfFit::new(&found).unwrap();
+        let first = place.attempt(DRIFT, DRIFT.first()).unwrap();
+        let own = first.amplitude;
+        let amplitude = place.again(first).unwrap().amplitude;
+        assert!((own - 0.5).abs() > 0.05 && (amplitude - 0.5).abs() < 0.01, "{own} {amplitude}");
     }
 }

@@ -140,3 +140,31 @@ impl Bottom {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::result::result;
+    use super::*;
+    use crate::case::{Experiment, Per};
+    use crate::fit::asked::problem::tests::logged;
+    use crate::fit::search::starts::tests::at_start;
+
+    /// Fourteen logs, each with a friction of its own: a profile takes some 300 simulations of a log.
+    #[test]
+    fn profiles_are_as_many_as_their_simulations_allow_and_twelve_at_most() {
+        let rows = ["belt={ model = \"rigid\" }", "experiment.0.every=10ms", "experiment.0.until=0.2s"];
+        let (mut case, mut plan) = logged(&rows, false);
+        let one = case.experiments.remove(0);
+        case.experiments = (0..14).map(|k| Experiment { name: format!("log {k}"), ..one.clone() }).collect();
+        (plan.separate, plan.per) = (plan.free.clone(), Per::Log);
+        let mut fit = result(&at_start(Problem::new(&case, &plan).unwrap()), None);
+        fit.estimates.iter_mut().for_each(|own| own.error = Some(0.05 * own.value));
+        let mut count = |simulations: u64| {
+            fit.work.simulations = simulations;
+            profiles(&case, &plan, &fit, None).unwrap().len()
+        };
+        // 1000 in any case, or four times those of the fit.
+        let found = [100, 500, 10_000].map(&mut count);
+        assert!((3..6).contains(&found[0]) && (7..11).contains(&found[1]) && found[2] == 12, "{found:?}");
+    }
+}

@@ -316,6 +316,7 @@ fn descend(problem: &mut Problem, plan: &Plan, start: &[f64], iterations: usize)
 mod tests {
     use super::*;
     use crate::fit::asked::problem::tests::case;
+    use crate::fit::search::starts::tests::at_start;
 
     /// Missing values have no weight and no residual.
     #[test]
@@ -331,5 +332,24 @@ mod tests {
         for (quantity, mean) in squares(&problem, &residuals) {
             assert!((mean - 9.0).abs() < 1e-12, "{}: {mean}", quantity.name());
         }
+    }
+
+    /// A log that moves the wrong way, with mass and friction of the case 30 times too small.
+    #[test]
+    fn a_fit_to_a_corrected_log_comes_to_its_end() {
+        let (mut case, plan) = case(false);
+        let free = ["cart.mass", "cart.friction.viscous", "cart.friction.coulomb"].map(String::from).to_vec();
+        let plan = Plan { free, ..plan };
+        Remedy::Reverse.apply(Arc::make_mut(case.experiments[0].log.as_mut().unwrap()));
+        let cart = &mut case.machine.cart;
+        cart.mass *= 0.03;
+        for side in [&mut cart.friction.forward, &mut cart.friction.backward] {
+            [&mut side.viscous, &mut side.coulomb, &mut side.breakaway].into_iter().for_each(|own| *own *= 0.03);
+        }
+        let found = at_start(Problem::new(&case, &plan).unwrap());
+        let names = [found.problem.runs[0].name.as_str()];
+        let left = |most: usize| mended(&case, &plan, &found, &names, &Remedy::Reverse, most).unwrap().left;
+        let (own, end) = (left(TRIAL_FIT_ITERATIONS), left(100));
+        assert!(own < 1.01 * end && end < 1e-4, "{own} {end}");
     }
 }
