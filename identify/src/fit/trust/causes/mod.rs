@@ -300,3 +300,21 @@ fn widened(shift: &[f64], errors: &[f64]) -> DMatrix<f64> {
     // (|d| + h′)² ≤ 2 (d² + h′²)
     &d * d.transpose() * (2.0 / (NORMAL * NORMAL)) + own * 2.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::problem::Problem;
+    use crate::fit::asked::problem::tests::case;
+    use crate::fit::search::starts::tests::at_start;
+
+    #[test]
+    fn elements_are_looked_for_where_slow_noise_widens_the_errors() {
+        let (case, plan) = case(false);
+        let found = at_start(Problem::new(&case, &plan).unwrap());
+        let best = &found.best;
+        let judged = Judged::new(&found.problem, &best.residuals, &best.jacobian, &best.x, &best.at_bound).unwrap();
+        let asked = |inflation: f64| is_asked(&case, &plan, &found, &Judged { inflation, ..judged.clone() });
+        assert_eq!([1.0, 1.05, 1.2, 5.0].map(asked), [false, false, true, true]);
+    }
+}

@@ -213,7 +213,7 @@ impl<'a> Tried<'a> {
     pub fn may_be_like(&self, judged: &Judged, other: &Self) -> bool {
         let is_other = !self.problem.machine.has_one_coordinate() && self.kind() != other.kind();
         let n = self.problem.counted() as f64 / (judged.inflation * judged.inflation).max(1.0);
-        is_other && n * (other.least().max(0.0) / self.cost()).ln() < CAUSE_ALIKE * CAUSE_ALIKE
+        is_other && are_alike(n, self.cost(), other.least())
     }
 
     /// Information of the logs on it.
@@ -438,6 +438,17 @@ impl<'a> Tried<'a> {
     }
 }
 
+/// True if the likelihoods of `n` values with these costs are hardly less with the other one.
+fn are_alike(n: f64, cost: f64, other: f64) -> bool {
+    n * (other.max(0.0) / cost).ln() < CAUSE_ALIKE * CAUSE_ALIKE
+}
+
+/// True if the last steps of a search, with these costs so far, gained next to nothing.
+fn creeps(costs: &[f64]) -> bool {
+    let earlier = costs.len().checked_sub(1 + CAUSE_SLOW_STEPS).map(|k| costs[k]);
+    earlier.zip(costs.last()).is_some_and(|(earlier, cost)| earlier - cost < CAUSE_SLOW * cost)
+}
+
 /// The end of a short search that continues from a point. It ends early where it creeps above the cost `goal`.
 fn descend(problem: &mut Problem, from: Minimum, iterations: usize, goal: f64) -> Option<Minimum> {
     let options = Options {
@@ -451,9 +462,7 @@ fn descend(problem: &mut Problem, from: Minimum, iterations: usize, goal: f64) -
     let mut costs = Vec::new();
     let mut watch = |_: &[f64], cost: f64| {
         costs.push(cost);
-        let earlier = costs.len().checked_sub(1 + CAUSE_SLOW_STEPS).map(|k| costs[k]);
-        let creeps = earlier.is_some_and(|earlier| earlier - cost < CAUSE_SLOW * cost);
-        if creeps && cost > goal { Flow::Stop } else { Flow::Continue }
+        if creeps(&costs) && cost > goal { Flow::Stop } else { Flow::Continue }
     };
     let found = match from.ending {
         // Where iterations were used up, its derivatives are those at the point.
@@ -464,4 +473,45 @@ fn descend(problem: &mut Problem, from: Minimum, iterations: usize, goal: f64) -
     let is_there = found.jacobian.nrows() == problem.rows() && found.cost.is_finite();
     let is_stopped = found.ending == Ending::Failed || problem.is_stopped();
     (is_there && !is_stopped).then_some(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::EXTENSIONS;
+    use super::*;
+    use crate::case::Experiment;
+    use crate::fit::asked::problem::tests::case;
+    use crate::fit::search::starts::tests::at_start;
+
+    /// Of 1000 values, a cost that is greater by half a per cent is one of √5 standard errors.
+    #[test]
+    fn elements_are_alike_up_to_three_standard_errors() {
+        assert!(are_alike(1000.0, 70.0, 70.35) && are_alike(1000.0, 70.0, 60.0));
+        assert!(!are_alike(1000.0, 70.0, 71.4) && are_alike(200.0, 70.0, 71.4));
+    }
+
+    #[test]
+    fn a_search_that_gains_half_a_per_cent_in_four_steps_creeps() {
+        let falling = |share: f64, steps: i32| (0..=steps).map(|k| (1.0 - share).powi(k)).collect::<Vec<f64>>();
+        assert!(creeps(&falling(0.005 / 4.0, 4)) && creeps(&falling(0.005 / 4.0, 9)));
+        assert!(!creeps(&falling(0.02 / 4.0, 4)) && !creeps(&falling(0.0, 3)));
+    }
+
+    /// Each Jacobian takes several times their steps.
+    #[test]
+    fn bristles_are_not_tried_on_logs_that_take_too_many_steps() {
+        let tried = |logs: usize| {
+            let (mut case, plan) = case(false);
+            let one = case.experiments.remove(0);
+            case.experiments = (0..logs).map(|k| Experiment { name: format!("log {k}"), ..one.clone() }).collect();
+            let plan = Plan { free: vec!["cart.friction.coulomb".into()], ..plan };
+            let found = at_start(Problem::new(&case, &plan).unwrap());
+            let site = Site::new(&case, &plan, &found);
+            let row = EXTENSIONS.iter().find(|row| row.key == "lugre").unwrap();
+            let extended = (row.tries)(&site).remove(0);
+            Tried::from(&site, row, extended, (&found.problem, &found.best.x)).is_some()
+        };
+        // Some 500 steps for each.
+        assert_eq!([20, 60].map(tried), [true, false]);
+    }
 }
