@@ -353,3 +353,35 @@ impl Shape {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Candidates of 4 s at these points of the unit cube.
+    fn candidates(shares: [f64; 5]) -> [Shape; 5] {
+        let room = SearchLimits { input: 5.0, duration: 4.0, every: 1e-3, frequencies: [0.25, 200.0] };
+        Excitation::ALL.map(|kind| Shape::at(kind, &shares, &room))
+    }
+
+    /// How the axis comes to rest is observed, too.
+    #[test]
+    fn every_input_lasts_nearly_to_the_end_and_leaves_time_to_come_to_rest() {
+        for shape in candidates([1.0, 0.5, 0.7, 0.0, 1.0]) {
+            let signal = shape.signal();
+            let values: Vec<f64> = (0..4000).map(|k| signal.value(1e-3 * f64::from(k))).collect();
+            let last = values.iter().rposition(|value| value.abs() > 1e-9).unwrap();
+            assert!((3400..3800).contains(&last), "{shape:?}: {last}");
+        }
+    }
+
+    /// They are written in a case file, to be read there.
+    #[test]
+    fn an_input_consists_of_a_limited_number_of_parts() {
+        let [trapezoid, sweep, _, multisine, _] = candidates([1.0, 1.0, 1.0, 1.0, 1.0]);
+        let Shape::Multisine { tones, .. } = multisine else { panic!("{multisine:?}") };
+        assert_eq!((trapezoid.corners().len(), sweep.sines().len(), tones), (65, 8, 20));
+        let Shape::Prbs { bit, lasts, .. } = candidates([1.0, 0.0, 0.0, 0.0, 0.0])[4] else { panic!() };
+        assert!((300.0..=400.0).contains(&(lasts / bit)), "{bit} {lasts}");
+    }
+}

@@ -331,3 +331,20 @@ fn measured(case: &Case, request: &Request) -> Result<Vec<Channel>> {
 
 /// Groups of parameters that the experiment cannot distinguish, each with remedies.
 pub type Undetermined = Vec<(Group, Vec<String>)>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::TEMPLATE;
+
+    #[test]
+    fn an_experiment_of_a_machine_alone_has_4001_samples() {
+        let machine = TEMPLATE.split("[[experiment]]").next().unwrap();
+        let case = Case::from_text("axis.toml", machine).unwrap();
+        let names = vec!["cart.mass".into()];
+        let request = Request { names, input: Some(6.0), travel: Some(0.1), ..Request::default() };
+        let task = Task::new(&case, &request, &|| false).unwrap();
+        let times = trial::samples(task.every, task.duration);
+        assert!(times.len() == 4001 && (times[4000] - 4.0).abs() < 1e-9, "{} {:?}", times.len(), times.last());
+    }
+}

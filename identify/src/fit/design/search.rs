@@ -244,14 +244,12 @@ fn refined(
     (from, score): (&[f64], f64),
     tried: &mut usize,
 ) -> Option<(Shape, Vec<f64>, f64)> {
-    let logit: Vec<f64> = from.iter().map(|share| (share / (1.0 - share)).ln()).collect();
     let mut best: Option<(Shape, Vec<f64>, f64)> = None;
     let first = *tried;
-    cmaes::search(kind.numbers(), FIRST_SIGMA, DESIGN_BARREN, &mut |z| {
+    evolved(from, &mut |point| {
         if (task.stop)() || *tried - first >= MOST_VALUES {
             return (f64::INFINITY, false);
         }
-        let point: Vec<f64> = logit.iter().zip(z.iter()).map(|(a, z)| 1.0 / (1.0 + (-a - z).exp())).collect();
         let Some((shape, value)) = look(task, kind, driven, &point, tried) else { return (f64::INFINITY, false) };
         let least = best.as_ref().map_or(score, |(.., least)| *least);
         if value < least {
@@ -260,6 +258,14 @@ fn refined(
         (value.ln(), value < 0.99 * least)
     });
     best
+}
+
+/// Evaluates points of the unit cube by an evolution strategy from one of them.
+fn evolved(from: &[f64], evaluate: &mut dyn FnMut(Vec<f64>) -> (f64, bool)) {
+    let logit: Vec<f64> = from.iter().map(|share| (share / (1.0 - share)).ln()).collect();
+    cmaes::search(from.len(), FIRST_SIGMA, DESIGN_BARREN, &mut |z| {
+        evaluate(logit.iter().zip(z.iter()).map(|(a, z)| 1.0 / (1.0 + (-a - z).exp())).collect())
+    });
 }
 
 /// The machine with each free parameter changed to either side.
@@ -337,10 +343,15 @@ impl Task<'_> {
             criterion: self.criterion,
             score,
             alternatives,
-            own: case.experiments.iter().take(MOST_COMPARED).filter_map(|experiment| self.own(experiment)).collect(),
+            own: self.compared(case),
             tried,
             interrupted: (self.stop)(),
         }
+    }
+
+    /// Information of the first experiments of the case.
+    fn compared(&self, case: &Case) -> Vec<Own> {
+        case.experiments.iter().take(MOST_COMPARED).filter_map(|experiment| self.own(experiment)).collect()
     }
 
     /// Information of an experiment of the case, measured as the design is.
@@ -381,5 +392,40 @@ mod tests {
         let masses: Vec<f64> = all.iter().map(|one| one.cart.mass / own).filter(|share| *share != 1.0).collect();
         assert!(masses.len() == 2 && (masses[0] - 0.9).abs() < 1e-12 && (masses[1] - 1.1).abs() < 1e-12, "{masses:?}");
         assert!(machines(0.0).1.is_empty());
+    }
+
+    fn request(duration: f64) -> Request {
+        Request { names: vec!["cart.mass".into()], duration, ..Request::default() }
+    }
+
+    /// A sine has ten samples a period at least, and a long experiment 400 periods at most.
+    #[test]
+    fn the_highest_frequency_is_one_that_a_log_shows() {
+        let case = Case::from_text("axis.toml", TEMPLATE).unwrap();
+        let highest = |duration: f64| room(&Task::new(&case, &request(duration), &|| false).unwrap()).frequencies[1];
+        let close = |found: f64, known: f64| (found / known - 1.0).abs() < 1e-9;
+        assert!(close(highest(1.0), 100.0) && close(highest(20.0), 20.0) && close(highest(100.0), 4.0));
+    }
+
+    /// About the middle of its ranges, an input is moved by a sixth of them first: not to their ends, and not only
+    /// beside itself.
+    #[test]
+    fn an_evolution_of_inputs_begins_around_the_best_of_the_first_points() {
+        let mut points = Vec::new();
+        evolved(&[0.5; 5], &mut |point| {
+            points.push(point);
+            (f64::INFINITY, false)
+        });
+        let off = points.concat().iter().map(|share| (share - 0.5).powi(2)).collect::<Vec<f64>>();
+        let far = (off.iter().sum::<f64>() / off.len() as f64).sqrt();
+        assert!(points.len() > 4 && (0.1..0.25).contains(&far), "{far}");
+    }
+
+    #[test]
+    fn a_design_is_compared_with_the_first_eight_experiments() {
+        let mut case = Case::from_text_with("axis.toml", TEMPLATE, &["experiment.0.until=50ms"]).unwrap();
+        case.experiments = vec![case.experiments[0].clone(); 12];
+        let own = Task::new(&case, &request(1.0), &|| false).unwrap().compared(&case);
+        assert_eq!(own.len(), 8);
     }
 }

@@ -35,6 +35,21 @@ fn limits_of_normal_deviates_are_theirs() {
     assert!((SENSOR_START - 12f64.sqrt().recip()).abs() < 1e-4);
 }
 
+/// Probability that the squares of `n` standard normal values have a sum beyond this.
+fn squares_beyond(n: usize, sum: f64) -> f64 {
+    let odd = if n % 2 == 1 { libm::erfc((0.5 * sum).sqrt()) } else { 0.0 };
+    let term = |k: f64| (0.5 * sum).powf(k) * (-0.5 * sum).exp() / libm::tgamma(k + 1.0);
+    odd + (1..=n / 2).map(|i| term(0.5 * n as f64 - i as f64)).sum::<f64>()
+}
+
+/// Four machines are the fewest with which this happens in less than one of 200 cases; more take more time.
+#[test]
+fn an_honest_promise_is_seldom_broken_by_the_machines_that_verify_it() {
+    let broken = |n: usize| squares_beyond(n, n as f64 * PROMISE_BROKEN * PROMISE_BROKEN);
+    assert!(near(broken(1), 0.0455, 1e-2) && near(broken(2), (-4f64).exp(), 1e-9));
+    assert!(broken(VERIFIED) < 0.005 && broken(VERIFIED - 1) > 0.005, "{} {}", broken(VERIFIED), broken(VERIFIED - 1));
+}
+
 #[test]
 fn limits_of_rasters_are_those_of_their_errors() {
     // Straight lines through v² at distances h differ from it by h²/4 at most, of the greatest at v = 1.
