@@ -402,12 +402,14 @@ pub const UNDETERMINED: f64 = 1.0;
 /// however many values there are: averages of thousands of values would determine it only for a machine that follows
 /// the model to a fraction of one step, and no machine does.
 ///
-/// Unit: steps of the converter, as standard deviations of rounding. Source: chosen.
+/// Unit: steps of the converter, as standard deviations of rounding. Source: chosen. Test:
+/// `what_moves_the_outputs_less_than_a_machine_can_show_is_not_determined`.
 pub const LEAST_SHOWN: f64 = 0.2;
 
 /// Model error relative to the range of the values.
 ///
-/// Unit: 1. Source: chosen: no model of an axis is better.
+/// Unit: 1. Source: chosen: no model of an axis is better. Test:
+/// `what_moves_the_outputs_less_than_a_machine_can_show_is_not_determined`.
 pub const MODEL_ERROR: f64 = 2e-4;
 
 /// Share of a parameter in directions that are not determined, above which it is not determined either.
@@ -422,7 +424,8 @@ pub(crate) const SINGULAR_ROUNDING: f64 = 1e-8;
 
 /// Maximum iterations of a singular value decomposition.
 ///
-/// Unit: iterations. Source: far beyond what one takes.
+/// Unit: iterations. Source: far beyond what one takes. Test:
+/// `a_decomposition_takes_a_hundredth_of_the_iterations_that_it_may`.
 pub(crate) const MOST_SWEEPS: usize = 10_000;
 
 /// Deviation from 1 up to which the ratio of two powers counts as 1.
@@ -489,12 +492,12 @@ pub(crate) const FEWEST_WINDOWS: f64 = 6.0;
 
 /// Least length of a window that is compared with the whole logs.
 ///
-/// Unit: samples. Source: chosen.
+/// Unit: samples. Source: chosen. Test: `a_long_log_has_24_windows_and_a_short_one_windows_of_100_samples`.
 pub(crate) const WINDOW_SAMPLES: f64 = 100.0;
 
 /// Inflation of standard errors by slow noise, below which residuals hide no other model.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `elements_are_looked_for_where_slow_noise_widens_the_errors`.
 pub(crate) const COLOURED: f64 = 1.1;
 
 /// Deviation of the windows from the whole logs, and from each other, above which they disagree.
@@ -509,12 +512,12 @@ pub(crate) const COST_GROWTH: f64 = 3e-3;
 
 /// Maximum rounds towards the nearest point.
 ///
-/// Unit: rounds. Source: chosen.
+/// Unit: rounds. Source: chosen. Test: `a_curved_set_is_approached_in_rounds`.
 pub(crate) const NEAREST_ROUNDS: usize = 3;
 
 /// Relative change of the variables below which no further round follows.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `no_round_follows_one_that_hardly_moved`.
 pub(crate) const NEAREST_SETTLED: f64 = 1e-3;
 
 /// Square share of a parameter in directions that are not determined, from which on it keeps its given value exactly if
@@ -579,22 +582,22 @@ pub(crate) const LAW_DUST: f64 = 1e-6;
 
 /// Segments of a log along which friction drifts.
 ///
-/// Unit: segments. Source: chosen.
+/// Unit: segments. Source: chosen. Test: `friction_that_drifts_in_segments_moves_a_cart_as_one_that_drifts_with_time`.
 pub(crate) const DRIFT_PARTS: usize = 10;
 
 /// Rounds in which the column of another law is taken again at the amplitude that it led to.
 ///
-/// Unit: rounds. Source: chosen.
+/// Unit: rounds. Source: chosen. Test: `the_amplitude_of_a_law_is_found_though_its_effect_bends`.
 pub(crate) const LAW_ROUNDS: usize = 3;
 
 /// Gain that a kink may promise and not keep before it is reported.
 ///
-/// Unit: standard errors. Source: chosen.
+/// Unit: standard errors. Source: chosen. Test: `a_search_that_stalls_far_from_a_minimum_is_a_warning`.
 pub(crate) const KINK_PROMISE: f64 = 2.0;
 
 /// Explained share of an output below which a model explains nothing.
 ///
-/// Unit: %. Source: chosen.
+/// Unit: %. Source: chosen. Test: `a_log_of_which_less_than_half_is_explained_is_a_warning`.
 pub(crate) const POOR_FIT: f64 = 50.0;
 
 /// Ratio of K_t and K_e of one motor that is reported; in SI units they are the same number.
@@ -655,7 +658,7 @@ pub(crate) const UNEXPLAINED_WINDOWS: [f64; 3] = [4.0, 16.0, 64.0];
 
 /// Explained share of the windows, beyond a straight line in each, from which on errors add up along the log.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `errors_that_add_up_along_a_log_are_told_from_those_within_windows`.
 pub(crate) const WINDOWS_EXPLAIN: f64 = 0.8;
 
 /// Entries of the Jacobian up to which windows are tried.
@@ -671,7 +674,8 @@ pub(crate) const UNEXPLAINED_NOISE: f64 = 3.0;
 
 /// Windows that the longest log is cut into to find a part in which the machine does not follow its input.
 ///
-/// Unit: windows. Source: chosen: a part of a few hundredths of a log fills one.
+/// Unit: windows. Source: chosen: a part of a few hundredths of a log fills one. Test:
+/// `a_long_log_has_24_windows_and_a_short_one_windows_of_100_samples`.
 pub(crate) const INTERRUPTED_WINDOWS: f64 = 24.0;
 
 /// Residuals of a window relative to the usual ones from which on it is such a part.
@@ -686,7 +690,7 @@ pub(crate) const UNINTERRUPTED: f64 = 3.0;
 
 /// Share of the windows that such a part may have.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `a_part_that_is_off_is_an_interruption_up_to_a_quarter_of_the_log`.
 pub(crate) const INTERRUPTED_SHARE: f64 = 0.25;
 
 /// Least size of usual residuals, relative to the noise of the logs.
@@ -766,7 +770,7 @@ pub(crate) const JUMP: f64 = 0.5;
 
 /// Maximum Jacobians of the fit to a corrected log.
 ///
-/// Unit: Jacobians. Source: chosen.
+/// Unit: Jacobians. Source: chosen. Test: `a_fit_to_a_corrected_log_comes_to_its_end`.
 pub(crate) const TRIAL_FIT_ITERATIONS: usize = 15;
 
 /// Deviations from the estimate at which a profile holds its parameter; outwards, so that each fit starts where the
@@ -777,17 +781,17 @@ pub(crate) const PROFILE_AT: [[f64; 3]; 2] = [[-1.0, -2.0, -3.0], [1.0, 2.0, 3.0
 
 /// Maximum number of parameters that are profiled.
 ///
-/// Unit: parameters. Source: chosen.
+/// Unit: parameters. Source: chosen. Test: `profiles_are_as_many_as_their_simulations_allow_and_twelve_at_most`.
 pub(crate) const MOST_PROFILED: usize = 12;
 
 /// Simulated logs that profiles may take, relative to those of the fit.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `profiles_are_as_many_as_their_simulations_allow_and_twelve_at_most`.
 pub(crate) const PROFILE_WORK: u64 = 4;
 
 /// Simulated logs that profiles may take in any case.
 ///
-/// Unit: simulations. Source: chosen.
+/// Unit: simulations. Source: chosen. Test: `profiles_are_as_many_as_their_simulations_allow_and_twelve_at_most`.
 pub(crate) const PROFILE_SIMULATIONS: u64 = 1000;
 
 /// Relative deviation of the cost two standard errors off from that of a linear model, above which it is reported.
@@ -983,7 +987,7 @@ pub(crate) const BRISTLE_BEND: f64 = 2e-5;
 
 /// Default length of an experiment.
 ///
-/// Unit: s. Source: chosen.
+/// Unit: s. Source: chosen. Test: `an_experiment_of_a_machine_alone_has_4001_samples`.
 pub const DURATION: f64 = 4.0;
 
 /// Smallest relative error that a designed experiment promises: no model is better than this.
@@ -993,12 +997,12 @@ pub const DESIGN_MODEL_ERROR: f64 = 0.01;
 
 /// Machines on which a designed experiment is verified unless another number is given.
 ///
-/// Unit: machines. Source: time.
+/// Unit: machines. Source: time. Test: `an_honest_promise_is_seldom_broken_by_the_machines_that_verify_it`.
 pub const VERIFIED: usize = 4;
 
 /// Default sample interval of an experiment.
 ///
-/// Unit: s. Source: chosen.
+/// Unit: s. Source: chosen. Test: `an_experiment_of_a_machine_alone_has_4001_samples`.
 pub(crate) const SAMPLE_INTERVAL: f64 = 1e-3;
 
 /// Maximum rows of an experiment.
@@ -1028,7 +1032,7 @@ pub(crate) const HOPEFUL: f64 = 1.6;
 
 /// First step size of the evolution of an input.
 ///
-/// Unit: logit of a share. Source: chosen.
+/// Unit: logit of a share. Source: chosen. Test: `an_evolution_of_inputs_begins_around_the_best_of_the_first_points`.
 pub(crate) const FIRST_SIGMA: f64 = 0.7;
 
 /// Largest number of evaluations by the evolution strategy, for each kind, and again for the best.
@@ -1043,37 +1047,37 @@ pub(crate) const OF_RATE: f64 = 0.1;
 
 /// Highest frequency of an input, in periods of the experiment.
 ///
-/// Unit: periods. Source: chosen.
+/// Unit: periods. Source: chosen. Test: `the_highest_frequency_is_one_that_a_log_shows`.
 pub(crate) const MOST_PERIODS: f64 = 400.0;
 
 /// Maximum number of experiments of the case with which a design is compared.
 ///
-/// Unit: experiments. Source: chosen.
+/// Unit: experiments. Source: chosen. Test: `a_design_is_compared_with_the_first_eight_experiments`.
 pub(crate) const MOST_COMPARED: usize = 8;
 
 /// Share of an experiment at its end in which the input is zero: how the axis comes to rest is observed, too.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `every_input_lasts_nearly_to_the_end_and_leaves_time_to_come_to_rest`.
 pub(crate) const REST_AT_END: f64 = 0.08;
 
 /// Maximum number of trapezoids there and back.
 ///
-/// Unit: cycles. Source: chosen.
+/// Unit: cycles. Source: chosen. Test: `an_input_consists_of_a_limited_number_of_parts`.
 pub(crate) const MOST_CYCLES: f64 = 8.0;
 
 /// Maximum number of sines of a stepped sweep.
 ///
-/// Unit: sines. Source: chosen.
+/// Unit: sines. Source: chosen. Test: `an_input_consists_of_a_limited_number_of_parts`.
 pub(crate) const SWEEP_SINES: f64 = 8.0;
 
 /// Maximum number of sines of a multisine.
 ///
-/// Unit: sines. Source: chosen.
+/// Unit: sines. Source: chosen. Test: `an_input_consists_of_a_limited_number_of_parts`.
 pub(crate) const MULTISINE_TONES: f64 = 20.0;
 
 /// Maximum bits of a binary sequence.
 ///
-/// Unit: bits. Source: chosen.
+/// Unit: bits. Source: chosen. Test: `an_input_consists_of_a_limited_number_of_parts`.
 pub(crate) const MOST_BITS: f64 = 400.0;
 
 /// Reductions of an amplitude until an input keeps the limits.
@@ -1150,7 +1154,8 @@ pub(crate) const CAUSE_MOST_CURVED: usize = 20_000;
 
 /// Most steps of one simulation of all logs with an element whose runs have no exact derivatives.
 ///
-/// Unit: steps, of some 10 µs. Source: chosen: bounds the time.
+/// Unit: steps, of some 10 µs. Source: chosen: bounds the time. Test:
+/// `bristles_are_not_tried_on_logs_that_take_too_many_steps`.
 pub(crate) const CAUSE_MOST_STEPS: u64 = 20_000;
 
 /// Median logarithmic gain of held-out parts from which on one part in which a start fails does not refute an element.
@@ -1270,7 +1275,7 @@ pub(crate) const KNOWN_SHARE: f64 = 0.05;
 
 /// Change of an estimate with an element from which on it is reported.
 ///
-/// Unit: relative to the estimate. Source: chosen.
+/// Unit: relative to the estimate. Source: chosen. Test: `an_estimate_that_a_cause_moves_by_two_per_cent_is_told`.
 pub(crate) const CAUSE_MOVES: f64 = 0.01;
 
 /// Longest time for which residuals that swing keep their sign.
@@ -1292,7 +1297,7 @@ pub(crate) const CAUSE_REACH: f64 = 2.0;
 
 /// Decrease of the cost in [`CAUSE_SLOW_STEPS`] below which a fit of play that explains nothing yet is given up.
 ///
-/// Unit: relative to the cost. Source: chosen.
+/// Unit: relative to the cost. Source: chosen. Test: `a_search_that_gains_half_a_per_cent_in_four_steps_creeps`.
 pub(crate) const CAUSE_SLOW: f64 = 0.01;
 
 /// Steps in which a fit has to progress.
@@ -1307,7 +1312,7 @@ pub(crate) const DRIVE_FACTORS: [f64; 2] = [0.2, 5.0];
 
 /// Difference of the likelihoods of two parameters up to which the logs do not tell which of them differs.
 ///
-/// Unit: standard errors. Source: chosen.
+/// Unit: standard errors. Source: chosen. Test: `elements_are_alike_up_to_three_standard_errors`.
 pub(crate) const CAUSE_ALIKE: f64 = 3.0;
 
 /// Yaw stiffnesses that are tried, at the belts.
