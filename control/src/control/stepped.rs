@@ -105,7 +105,8 @@ impl Clocked {
         let mut given = [0.0; DRIVES];
         for (drive, controller) in controllers.iter_mut().enumerate() {
             let (sensors, shares) = (&self.sensors[drive], self.shares[drive]);
-            let weighed = |all: &[Reference; SLIDES]| Reference::weighed(&mut Evaluation::plain(), shares, all);
+            let weighed =
+                |all: &[Reference; SLIDES]| Reference::weighed(&mut Evaluation::plain(), shares.iter().copied(), all);
             let [reference, ahead] = [&slides, &later].map(weighed);
             let forward = controller.forward(&later);
             let seen = Observation {

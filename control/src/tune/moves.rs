@@ -116,7 +116,7 @@ pub fn asked(machine: &Machine, motion: &Move) -> f64 {
         let mean = match Forward::new(whole, machine, drive) {
             Some(forward) => mean_square(motion, |time| {
                 let slides: Vec<Reference> = motion.profiles.iter().map(|profile| profile.at(time)).collect();
-                forward.electrical(&slides).0
+                forward.required(&slides).current
             }),
             None => {
                 let compensation = Compensation::new(machine, &FeedForward::NONE);

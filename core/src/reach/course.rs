@@ -43,26 +43,31 @@ impl<'a, T: AtInstant> Course<'a, T> {
     /// Values `at` the instants of these references, shapers included; `has_lines` if a force of the machine depends on
     /// position or speed by a line.
     pub fn new(profiles: &[Profile], has_lines: bool, at: impl Fn(f64) -> T + 'a) -> Self {
-        let (seams, end) = (Profile::seams(profiles), Profile::last_rest(profiles));
-        let intervals = if profiles.iter().any(Profile::is_sampled) {
-            1
-        } else if profiles.iter().flat_map(Profile::passages).any(|passage| passage.turn.is_some()) {
-            ON_ARC
-        } else {
-            INTERVALS
-        };
         let mut course = Self { at: Box::new(at), segments: Vec::new() };
-        let mut begin = 0.0;
-        course.segments.push(vec![(course.at)(begin)]);
-        for seam in seams.into_iter().chain([end]) {
-            if seam - begin > ROUNDING * end {
-                let by_lines = if has_lines { (WITH_LINES * (seam - begin) / end).ceil() as usize } else { 0 };
-                course.add([begin, seam], intervals.max(by_lines), DIVISIONS);
-                begin = seam;
-            }
+        course.segments.push(vec![(course.at)(0.0)]);
+        for (ends, intervals) in smooth(profiles, has_lines) {
+            course.add(ends, intervals, DIVISIONS);
         }
-        course.segments.push(vec![(course.at)(end)]);
+        course.segments.push(vec![(course.at)(Profile::last_rest(profiles))]);
         course
+    }
+
+    /// True if a value `at` the instants of these references exceeds its limit somewhere. Segments behind the first one
+    /// with such a value are not evaluated.
+    pub fn exceeds(
+        (profiles, has_lines): (&[Profile], bool),
+        at: impl Fn(f64) -> T + 'a,
+        limits: &[(f64, &dyn Fn(&T) -> f64)],
+    ) -> bool {
+        let ends = [0.0, Profile::last_rest(profiles)].map(|time| vec![at(time)]);
+        let mut course = Self { at: Box::new(at), segments: ends.into() };
+        let is_beyond = |course: &Self| limits.iter().any(|(limit, of)| course.is_beyond(*limit, of));
+        is_beyond(&course)
+            || smooth(profiles, has_lines).into_iter().any(|(ends, intervals)| {
+                course.segments.clear();
+                course.add(ends, intervals, DIVISIONS);
+                is_beyond(&course)
+            })
     }
 
     /// Adds a segment, divided where the direction changes.
@@ -131,8 +136,8 @@ impl<'a, T: AtInstant> Course<'a, T> {
         (self.at)(best.time)
     }
 
-    /// True if `of` exceeds this limit somewhere.
-    pub fn exceeds(&self, limit: f64, of: impl Fn(&T) -> f64) -> bool {
+    /// True if `of` exceeds this limit in one of the segments.
+    fn is_beyond(&self, limit: f64, of: impl Fn(&T) -> f64) -> bool {
         let (best, peaks) = self.scanned(&of);
         let refined = |peak: &Peak| peak.refined(|time| of(&(self.at)(time)), tolerance(limit)).value;
         best.value > limit || peaks.iter().filter(|peak| peak.bound > limit).any(|peak| refined(peak) > limit)
@@ -149,6 +154,27 @@ impl<'a, T: AtInstant> Course<'a, T> {
         }
         (best, peaks)
     }
+}
+
+/// Ends of the segments on which references are smooth, s, and the number of their intervals.
+fn smooth(profiles: &[Profile], has_lines: bool) -> Vec<([f64; 2], usize)> {
+    let (seams, end) = (Profile::seams(profiles), Profile::last_rest(profiles));
+    let intervals = if profiles.iter().any(Profile::is_sampled) {
+        1
+    } else if profiles.iter().flat_map(Profile::passages).any(|passage| passage.turn.is_some()) {
+        ON_ARC
+    } else {
+        INTERVALS
+    };
+    let (mut all, mut begin) = (Vec::new(), 0.0);
+    for seam in seams.into_iter().chain([end]) {
+        if seam - begin > ROUNDING * end {
+            let by_lines = if has_lines { (WITH_LINES * (seam - begin) / end).ceil() as usize } else { 0 };
+            all.push(([begin, seam], intervals.max(by_lines)));
+            begin = seam;
+        }
+    }
+    all
 }
 
 /// Accuracy of a peak of about this value.
@@ -298,7 +324,8 @@ mod tests {
             let dense = (0..=200_000).map(|k| needed(&at(rest * f64::from(k) / 2e5))).fold(0.0, f64::max);
             assert!(dense <= most * (1.0 + 1e-6), "{number}: {most}, {dense} at some instant");
             assert!(most <= dense * 1.05, "{number}: {most}, {dense} at some instant");
-            assert!(course.exceeds(most * (1.0 - 1e-8), needed) && !course.exceeds(most * (1.0 + 1e-8), needed));
+            let exceeds = |limit: f64| Course::exceeds((&profiles, false), at, &[(limit, &needed)]);
+            assert!(exceeds(most * (1.0 - 1e-8)) && !exceeds(most * (1.0 + 1e-8)));
             assert!(course.values().count() < 2500, "{}", course.values().count());
         }
     }

@@ -2,9 +2,8 @@
 
 use super::compensation::{Compensation, direction};
 use super::course::{AtInstant, Course};
-use super::forward::Forward;
+use super::forward::{Forward, Required};
 use super::pull_out::Curve;
-use crate::calculator::Evaluation;
 use crate::design::{Bounds, FeedForward, FeedForwardModel};
 use crate::machine::rigid::Rigid;
 use crate::machine::{AmplifierMode, Belt, BeltModel, Machine};
@@ -89,9 +88,13 @@ impl AtInstant for Need {
 }
 
 /// Speed and acceleration of up to three references.
-fn motions(references: &[Reference]) -> [[f64; 2]; 3] {
-    std::array::from_fn(|k| references.get(k).map_or([0.0; 2], |y| [y.speed, y.acceleration]))
+fn motions<'a>(references: impl IntoIterator<Item = &'a Reference>) -> [[f64; 2]; 3] {
+    let mut references = references.into_iter();
+    std::array::from_fn(|_| references.next().map_or([0.0; 2], |y| [y.speed, y.acceleration]))
 }
+
+/// Requirements at a time along references, s.
+type AtTime<'a> = Box<dyn Fn(f64) -> Need + 'a>;
 
 /// A quantity at one instant of a reference.
 type Quantity = Box<dyn Fn(&Need) -> f64>;
@@ -278,17 +281,23 @@ fn demanded<'a>(
     machine: &'a Machine,
     bounds: Bounds,
     profiles: &'a [Profile],
-) -> impl Iterator<Item = (Course<'a, Need>, Vec<Demand>)> {
+) -> impl Iterator<Item = (AtTime<'a>, Vec<Demand>)> {
     (0..machine.drives.len()).map(move |drive| match profiles {
         [profile] => (needs(machine, profile), demands(machine, bounds)),
         _ => (needs_of_drive(machine, drive, profiles), of_motor(machine, drive, bounds)),
     })
 }
 
+/// Requirements along references, shapers included.
+fn course<'a>(machine: &Machine, profiles: &[Profile], needs: AtTime<'a>) -> Course<'a, Need> {
+    Course::new(profiles, has_lines(machine), needs)
+}
+
 /// Largest use of each limit by references, shapers included; of several drives, the most loaded one.
 pub fn loads(machine: &Machine, bounds: Bounds, profiles: &[Profile]) -> Vec<Load> {
     let mut all: Vec<Load> = Vec::new();
-    for (course, demands) in demanded(machine, bounds, profiles) {
+    for (needs, demands) in demanded(machine, bounds, profiles) {
+        let course = course(machine, profiles, needs);
         for demand in demands {
             let (_, [needed, allowed]) = demand.most(&course);
             Load { limit: demand.limit, unit: demand.unit, needed: needed.max(0.0), allowed }.join(&mut all);
@@ -300,11 +309,11 @@ pub fn loads(machine: &Machine, bounds: Bounds, profiles: &[Profile]) -> Vec<Loa
 /// True if references, shapers included, use at most this fraction of each limit: of those of the motors, and of the
 /// others.
 pub(super) fn are_within(machine: &Machine, bounds: Bounds, profiles: &[Profile], [motor, belt]: [f64; 2]) -> bool {
-    demanded(machine, bounds, profiles).all(|(course, demands)| {
-        demands.iter().all(|demand| {
-            let share = if is_of_motor(demand.limit) { motor } else { belt };
-            !course.exceeds(share, |need| demand.share(need))
-        })
+    demanded(machine, bounds, profiles).all(|(needs, demands)| {
+        let shares: Vec<_> = demands.iter().map(|demand| |need: &Need| demand.share(need)).collect();
+        let of = |demand: &Demand| if is_of_motor(demand.limit) { motor } else { belt };
+        let limits = demands.iter().zip(&shares).map(|(demand, share)| (of(demand), share as &dyn Fn(&Need) -> f64));
+        !Course::exceeds((profiles, has_lines(machine)), needs, &limits.collect::<Vec<_>>())
     })
 }
 
@@ -330,23 +339,21 @@ pub fn shortfalls(machine: &Machine, bounds: Bounds, profiles: &[Profile]) -> Ve
 
 /// Limits exceeded at one drive of a machine with several.
 fn of_drive(machine: &Machine, bounds: Bounds, drive: usize, profiles: &[Profile]) -> Vec<Shortfall> {
-    let needs = needs_of_drive(machine, drive, profiles);
+    let needs = course(machine, profiles, needs_of_drive(machine, drive, profiles));
     let name = machine.geometry().drives[drive].label.name;
     let exceeded = of_motor(machine, drive, bounds).into_iter().filter_map(|demand| exceeded(&needs, &demand));
     exceeded.map(|short| Shortfall { words: format!("{name}: {}", short.words), ..short }).collect()
 }
 
 /// Requirements of one of several drives, with rigid belts.
-fn needs_of_drive<'a>(machine: &Machine, drive: usize, profiles: &'a [Profile]) -> Course<'a, Need> {
+fn needs_of_drive<'a>(machine: &Machine, drive: usize, profiles: &'a [Profile]) -> AtTime<'a> {
     let all = FeedForward { model: FeedForwardModel::Rigid, ..FeedForward::NONE };
     let forward = Forward::new(all, machine, drive).expect("a machine with several drives");
-    Course::new(profiles, has_lines(machine), move |time| {
-        let slides: Vec<Reference> = profiles.iter().map(|profile| profile.at(time)).collect();
-        let (current, voltage) = forward.electrical(&slides);
-        let along = forward.along(&mut Evaluation::plain(), &slides);
-        let motions = motions(&[&slides[..], &[along]].concat());
-        let at = Instant { time, y: along };
-        Need { at, force: forward.force(&slides), current, voltage, spans: [0.0; 3], motions }
+    Box::new(move |time| {
+        let slides: [Reference; 2] = std::array::from_fn(|slide| profiles[slide].at(time));
+        let Required { along, force, current, voltage } = forward.required(&slides);
+        let motions = motions(slides.iter().chain([&along]));
+        Need { at: Instant { time, y: along }, force, current, voltage, spans: [0.0; 3], motions }
     })
 }
 
@@ -356,7 +363,7 @@ fn has_lines(machine: &Machine) -> bool {
 }
 
 fn of_axis(machine: &Machine, bounds: Bounds, profile: &Profile) -> Vec<Shortfall> {
-    let needs = needs(machine, profile);
+    let needs = course(machine, std::slice::from_ref(profile), needs(machine, profile));
     let (volts, _) = limits(machine, bounds);
     let mut found: Vec<Shortfall> = Vec::new();
     for demand in demands(machine, bounds) {
@@ -531,7 +538,8 @@ pub(super) fn along_path(profiles: &[Profile], limits: [Requested; 3]) -> Vec<Sh
 /// Limits of the motors of which references, shaper included, leave less than this reserve, 0 to 1.
 pub fn without_reserve(machine: &Machine, bounds: Bounds, profiles: &[Profile], reserve: f64) -> Vec<Shortfall> {
     let mut found = Vec::new();
-    for (course, demands) in demanded(machine, bounds, profiles) {
+    for (needs, demands) in demanded(machine, bounds, profiles) {
+        let course = course(machine, profiles, needs);
         for demand in demands.into_iter().filter(|demand| is_of_motor(demand.limit)) {
             let (need, [needed, allowed]) = demand.most(&course);
             let left = (1.0 - reserve) * allowed;
@@ -589,9 +597,9 @@ fn limits_of(machine: &Machine, drive: usize, bounds: Bounds) -> (Option<f64>, O
 }
 
 /// Requirements of an axis.
-fn needs<'a>(machine: &'a Machine, profile: &'a Profile) -> Course<'a, Need> {
+fn needs<'a>(machine: &'a Machine, profile: &'a Profile) -> AtTime<'a> {
     let compensation = Compensation::new(machine, &FeedForward::NONE);
-    Course::new(std::slice::from_ref(profile), has_lines(machine), move |time| {
+    Box::new(move |time| {
         let y = profile.at(time);
         // It contains a force along the travel, but not one by speed.
         let needed = compensation.needed(&y);

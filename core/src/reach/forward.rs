@@ -55,6 +55,19 @@ struct Span {
     follows: Option<Follows>,
 }
 
+/// What a motion requires of a motor.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Required {
+    /// Reference of the drive's part of the belt, without stretch.
+    pub along: Reference,
+    /// Motor force at the belt, N.
+    pub force: f64,
+    /// Motor current, A.
+    pub current: f64,
+    /// Voltage at its terminals, V.
+    pub voltage: f64,
+}
+
 /// Motion of the belt at the drive pulley, and the motor force there.
 struct Needed<N> {
     drive: Reference<N>,
@@ -92,8 +105,7 @@ impl Forward {
 
     /// The reference of its part of the belt, without stretch.
     pub fn along<C: Calculator>(&self, c: &mut C, slides: &[Reference<C::N>]) -> Reference<C::N> {
-        let shares: Vec<f64> = self.slides.iter().map(|slide| slide.share).collect();
-        Reference::weighed(c, &shares, slides)
+        Reference::weighed(c, self.slides.iter().map(|slide| slide.share), slides)
     }
 
     /// The reference of its encoder, for which the slides follow theirs, from that of its part of the belt.
@@ -127,11 +139,6 @@ impl Forward {
             (force, rate) = (force + push * slide.lever, rate + change * slide.lever);
         }
         [force, rate]
-    }
-
-    /// Motor force at the belt for the motion of a rigid belt, N.
-    pub fn force(&self, slides: &[Reference]) -> f64 {
-        self.share_of_force(&mut Evaluation::plain(), slides, self.shares())[0]
     }
 
     /// The factors on inertia and friction.
@@ -202,12 +209,13 @@ impl Forward {
         Some(self.pulley.split(c, speed, command))
     }
 
-    /// Motor current, A, and terminal voltage, V, for the force with a rigid belt.
-    pub fn electrical(&self, slides: &[Reference]) -> (f64, f64) {
+    /// What the motion requires of the motor with a rigid belt.
+    pub fn required(&self, slides: &[Reference]) -> Required {
         let c = &mut Evaluation::plain();
         let [force, rate] = self.share_of_force(c, slides, self.shares());
         let along = self.along(c, slides);
-        self.pulley.electrical(force, rate, &self.accelerated(along))
+        let (current, voltage) = self.pulley.electrical(force, rate, &self.accelerated(along));
+        Required { along, force, current, voltage }
     }
 
     /// A motion of the pulley with the share of the inertia that is fed forward.

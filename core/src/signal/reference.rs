@@ -77,10 +77,10 @@ impl<N: Number> Reference<N> {
     }
 
     /// Σ w_s q_s, such as the position of a drive along its belt from those of all slides.
-    pub fn weighed<C: Calculator<N = N>>(c: &mut C, weights: &[f64], slides: &[Self]) -> Self {
+    pub fn weighed<C: Calculator<N = N>>(c: &mut C, weights: impl Iterator<Item = f64>, slides: &[Self]) -> Self {
         let zero = c.number(0.0);
         let none = Self { position: zero, speed: zero, acceleration: zero, jerk: zero, snap: zero };
-        let moving = weights.iter().zip(slides).filter(|(weight, _)| **weight != 0.0);
-        moving.fold(none, |sum, (weight, slide)| sum.plus(*weight, *slide))
+        let moving = weights.zip(slides).filter(|(weight, _)| *weight != 0.0);
+        moving.fold(none, |sum, (weight, slide)| sum.plus(weight, *slide))
     }
 }

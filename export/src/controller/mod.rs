@@ -66,7 +66,7 @@ pub(super) fn program(design: &Design, model: &Machine, drive: usize, largest: f
         _ => {
             c.remark("the part of the belt at this drive");
             let shares = model.belt_shares()[drive];
-            let [reference, later] = [&now, &ahead].map(|slides| Reference::weighed(c, shares, slides));
+            let [reference, later] = [&now, &ahead].map(|slides| Reference::weighed(c, shares.iter().copied(), slides));
             Observation { time: 0.0, reference, ahead: later, position, scale: None, current }
         }
     };
