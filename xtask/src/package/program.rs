@@ -105,7 +105,7 @@ pub fn make(build: &Build, twice: bool, claims: &mut Claims) -> Result<Option<Pr
         licences("taut-cli", triple, "The program contains these packages of others, under these licences.")?;
     claims.add("licences", licences.figure());
     write(&folder.join("LICENCES.txt"), &licences.text)?;
-    let materials = materials(places, triple)?;
+    let materials = materials(places, triple, "cli")?;
     claims.add("bill of materials", listed(&materials, &licences)?);
     write(&folder.join("taut.cdx.json"), materials)?;
     let runner = build.runner()?;
@@ -133,6 +133,9 @@ pub fn make(build: &Build, twice: bool, claims: &mut Claims) -> Result<Option<Pr
     if let Some(tried) = tried.as_ref().filter(|_| own_target().is_ok_and(|own| own == triple)) {
         claims.add("its FMU in FMPy", in_importer(&tried.unit(), tried)?);
     }
+    let files = crate::book::files(&folder)?;
+    files.iter().try_for_each(|file| paths::check(file).map(drop))?;
+    claims.add("archive", format!("{} files, no paths of this machine in them", files.len()));
     archive(&folder, &places.out.join(format!("{name}.tar.gz")))?;
     Ok(tried)
 }
@@ -215,30 +218,39 @@ pub fn licences(member: &str, triple: &str, opening: &str) -> Result<Licences, S
     }
 }
 
-/// A bill of materials of the program, by cargo-cyclonedx, without the time at which it was written.
-fn materials(places: &Places, triple: &str) -> Result<Vec<u8>, String> {
+/// A bill of materials of the program or library in this folder of the workspace, by cargo-cyclonedx, without the time
+/// and the place of its writing.
+pub fn materials(places: &Places, triple: &str, member: &str) -> Result<String, String> {
     // A debug build: it is built for one use.
     let tool = crate::book::installed("cargo-cyclonedx", CYCLONEDX, &["--debug"])?;
-    let name = "taut-materials";
+    let (name, own) = ("taut-materials", format!("{member}/Cargo.toml"));
     let mut list = Command::new(tool);
-    list.args(["cyclonedx", "--format", "json", "--manifest-path", "cli/Cargo.toml", "--target", triple, "--quiet"]);
+    list.args(["cyclonedx", "--format", "json", "--manifest-path", &own, "--target", triple, "--quiet"]);
     list.args(["--override-filename", name]).env("SOURCE_DATE_EPOCH", "0").env("PATH", with_tools(places)?);
     output(list)?;
-    // It writes beside the manifest of every member; the program's is the one that is wanted.
+    // It writes beside the manifest of every member; one is wanted.
     let (members, mut found) = (members()?, None);
     for manifest in members.iter().filter_map(|one| one["manifest_path"].as_str()) {
         let file = Path::new(manifest).with_file_name(format!("{name}.json"));
-        if manifest.ends_with("cli/Cargo.toml") {
-            found = fs::read(&file).ok();
+        if Path::new(manifest).ends_with(&own) {
+            found = fs::read_to_string(&file).ok();
         }
         let _ = fs::remove_file(&file);
     }
-    found.ok_or_else(|| "cargo-cyclonedx wrote no bill of materials".into())
+    let here = std::env::current_dir().map_err(|e| format!("the present folder: {e}"))?;
+    let found = found.ok_or("cargo-cyclonedx wrote no bill of materials")?;
+    Ok(without_folder(&found, &here))
+}
+
+/// A bill whose members of the workspace lie in `/taut`. Their references are URLs: `path+file:///folder/cli#…`.
+fn without_folder(bill: &str, folder: &Path) -> String {
+    let url = format!("path+file:///{}", folder.display().to_string().replace('\\', "/").trim_start_matches('/'));
+    bill.replace(&url, "path+file:///taut")
 }
 
 /// Summary of a bill of materials. Errors: it is invalid, or lacks a package of `licences`.
-fn listed(materials: &[u8], licences: &Licences) -> Result<String, String> {
-    let bill: Value = serde_json::from_slice(materials).map_err(|e| format!("the bill of materials: {e}"))?;
+pub fn listed(materials: &str, licences: &Licences) -> Result<String, String> {
+    let bill: Value = serde_json::from_str(materials).map_err(|e| format!("the bill of materials: {e}"))?;
     let components = bill["components"].as_array().map(Vec::as_slice).unwrap_or_default();
     let word = |component: &Value, key: &str| component[key].as_str().unwrap_or_default().to_string();
     let names: Vec<String> = components
@@ -285,9 +297,17 @@ mod tests {
 
     #[test]
     fn a_bill_that_lacks_a_package_is_refused() {
-        let bill = br#"{"bomFormat": "CycloneDX", "specVersion": "1.3", "components": [{"name": "libm", "version": "0.2.1"}]}"#;
+        let bill =
+            r#"{"bomFormat": "CycloneDX", "specVersion": "1.3", "components": [{"name": "libm", "version": "0.2.1"}]}"#;
         assert_eq!(listed(bill, &licences()), Err("the bill of materials lacks [\"libm 0.2.16\"]".into()));
-        assert!(listed(b"no JSON", &licences()).unwrap_err().starts_with("the bill of materials: "));
+        assert!(listed("no JSON", &licences()).unwrap_err().starts_with("the bill of materials: "));
+    }
+
+    #[test]
+    fn a_bill_does_not_say_where_it_was_written() {
+        let (here, there) = ("path+file:///home/me/taut/cli#taut-cli@0.1.0", "path+file:///taut/cli#taut-cli@0.1.0");
+        assert_eq!(without_folder(here, Path::new("/home/me/taut")), there);
+        assert_eq!(without_folder("path+file:///C:/me/cli#a", Path::new(r"C:\me")), "path+file:///taut/cli#a");
     }
 
     #[test]

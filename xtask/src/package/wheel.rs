@@ -1,6 +1,6 @@
 //! The Python wheel.
 
-use super::program::{Build, licences};
+use super::program::{Build, licences, listed, materials};
 use super::trial::{Program, in_importer, unpack};
 use super::{Claims, GLIBC, must, read};
 use crate::{output, write};
@@ -8,8 +8,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Licences of the packages in the wheel, where maturin finds them. It is there while the wheel is built.
+/// Licences of the packages in the wheel, and its bill of materials, where maturin finds them. They are there while the
+/// wheel is built.
 const LICENCES: &str = "py/LICENCES.txt";
+const MATERIALS: &str = "py/taut.cdx.json";
 
 /// Simulates a case and prints where the cart ends, m; writes its FMU; prints the version of Python.
 const SCRIPT: &str = "import platform, sys, taut
@@ -53,15 +55,20 @@ fn built(build: &Build, claims: &mut Claims) -> Result<PathBuf, String> {
     let _ = fs::remove_dir_all(&wheels);
     let opening = "The package contains these packages of others, under these licences.";
     let licences = licences("taut-python", build.triple, opening)?;
+    let materials = materials(build.places, build.triple, "py")?;
+    claims.add("bill of materials of the wheel", listed(&materials, &licences)?);
     write(Path::new(LICENCES), &licences.text)?;
+    write(Path::new(MATERIALS), &materials)?;
     let mut maturin = Command::new(crate::python::program(&build.places.tools, "maturin"));
     maturin.args(["build", "--locked", "--release", "--manifest-path", "py/Cargo.toml", "--out"]).arg(&wheels);
+    // It would look for a relative path in `py`.
+    maturin.arg("--sbom-include").arg(std::path::absolute(MATERIALS).map_err(|e| format!("{MATERIALS}: {e}"))?);
     if build.has_zig() {
         maturin.args(["--zig", "--compatibility", &format!("manylinux_{}_{}", GLIBC.0, GLIBC.1)]);
     }
     maturin.args(["--target", build.triple]).arg("--target-dir").arg(build.places.work.join("wheel"));
     let done = build.set(&mut maturin, Path::new(".")).and_then(|()| must(maturin));
-    let _ = fs::remove_file(LICENCES);
+    [LICENCES, MATERIALS].iter().for_each(|file| drop(fs::remove_file(file)));
     done?;
     let wheel = fs::read_dir(&wheels).ok().and_then(|mut all| Some(all.next()?.ok()?.path())).ok_or("no wheel")?;
     let name = wheel.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -73,7 +80,7 @@ fn built(build: &Build, claims: &mut Claims) -> Result<PathBuf, String> {
     unpack(&wheel, &inside)?;
     let files = crate::book::files(&inside)?;
     files.iter().try_for_each(|file| super::paths::check(file).map(drop))?;
-    for wanted in ["LICENSE-MIT", "LICENSE-APACHE", "LICENCES.txt"] {
+    for wanted in ["LICENSE-MIT", "LICENSE-APACHE", "LICENCES.txt", "sboms/taut.cdx.json"] {
         if !files.iter().any(|file| file.ends_with(wanted)) {
             return Err(format!("{name} has no {wanted}"));
         }
