@@ -327,6 +327,9 @@ fn a_force_that_is_missing_is_seen() {
     let mean = own.force.iter().sum::<f64>() / own.force.len() as f64;
     assert!((mean - 0.8).abs() < 0.08, "{mean}");
     assert!(own.time.len() > 1000 && own.position.len() == own.force.len());
+    // Friction is not known where the cart rests or reverses.
+    let ends = own.speed.iter().map(|v| v.abs()).fold([f64::INFINITY, 0.0], |[a, b], v| [v.min(a), v.max(b)]);
+    assert!((0.02..0.05).contains(&(ends[0] / ends[1])), "{ends:?}");
 }
 
 /// Laws began where viscous friction alone had led, with so much of it that a cart with Coulomb friction beside it

@@ -1,6 +1,6 @@
 //! Limits and thresholds of the fit, room by room.
 //!
-//! Each has its meaning, its unit (1 for a ratio), its source, and a test of its effect, if any. The source "chosen"
+//! Each has its meaning, its unit (1 for a ratio), its source, and a test of its effect. The source "chosen"
 //! marks a judgement. Other modules declare no such numbers; `tests/rooms.rs` checks this.
 
 // asked: what is compared with what
@@ -56,11 +56,6 @@ pub(crate) const INPUT_BEFORE_WINDOW: usize = 60;
 ///
 /// Unit: 1. Source: balance of truncation and rounding. Test: `limits_of_rasters_are_those_of_their_errors`.
 pub(crate) const EQUATION_STEP: f64 = 3e-5;
-
-/// Step by which a start is moved; the state is linear in it.
-///
-/// Unit: units of the variable. Source: any step is exact.
-pub(crate) const START_STEP: f64 = 1e-2;
 
 // search: where the least is
 
@@ -227,12 +222,12 @@ pub(crate) const TWO_BEFOREHAND: f64 = 0.35;
 
 /// Least ratio of the time constants of two slow noises, as a logarithm.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `two_slow_noises_are_told_apart`.
 pub(crate) const TIMES_APART: f64 = 1.0;
 
 /// Rounds in which each of two slow noises is sought again beside the other.
 ///
-/// Unit: rounds. Source: chosen.
+/// Unit: rounds. Source: chosen. Test: `two_slow_noises_are_told_apart`.
 pub(crate) const NOISE_TURNS: usize = 3;
 
 /// Prior probability of noise that swings.
@@ -242,7 +237,7 @@ pub(crate) const SWING_BEFOREHAND: f64 = 0.1;
 
 /// Least number of swings in the longest log.
 ///
-/// Unit: periods. Source: chosen: fewer are a drift.
+/// Unit: periods. Source: chosen: fewer are a drift. Test: `a_slow_wave_is_a_drift`.
 pub(crate) const SWINGS_IN_LOG: f64 = 5.0;
 
 /// Greatest frequency of noise that swings.
@@ -253,28 +248,30 @@ pub(crate) const SWING_FASTEST: f64 = 3.0;
 
 /// Ratio of neighbouring frequencies that are tried.
 ///
-/// Unit: 1. Source: chosen: about the width of a peak with `SWING_DAMPING`.
+/// Unit: 1. Source: chosen: about the width of a peak with `SWING_DAMPING`. Test:
+/// `narrow_band_noise_is_found_wherever_it_is`.
 pub(crate) const SWING_RATIO: f64 = 1.2;
 
 /// Damping ratio with which frequencies are tried.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `narrow_band_noise_is_found_wherever_it_is`.
 pub(crate) const SWING_DAMPING: f64 = 0.1;
 
 /// Variances with which frequencies are tried, relative to white noise of a block.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `narrow_band_noise_is_found_wherever_it_is`.
 pub(crate) const SWING_POWERS: [f64; 3] = [1.0, 30.0, 1000.0];
 
 /// Ways from the best frequency, time and variance: each alone, and time with variance, since a noise that keeps its
 /// phase through the log shows neither alone.
 ///
-/// Unit: of their logarithms. Source: 2 σ²/τ, the power that drives it.
+/// Unit: of their logarithms. Source: 2 σ²/τ, the power that drives it. Test: `intervals_hold_beside_a_tone`.
 pub(crate) const SWING_WAYS: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0]];
 
 /// First and greatest steps along them.
 ///
-/// Unit: of their logarithms. Source: chosen: as far as those that were tried are apart.
+/// Unit: of their logarithms. Source: chosen: as far as those that were tried are apart. Test:
+/// `narrow_band_noise_is_found_wherever_it_is`.
 pub(crate) const SWING_STEPS: [f64; 4] = [0.08, 2.0, 1.5, 1.0];
 
 /// Greatest number of rounds of steps.
@@ -284,7 +281,7 @@ pub(crate) const SWING_ROUNDS: usize = 60;
 
 /// Factor on a step that improves nothing; one that does grows by its inverse.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `narrow_band_noise_is_found_wherever_it_is`.
 pub(crate) const SWING_SHRINKS: f64 = 0.5;
 
 /// Steps, relative to the first, below which the search ends.
@@ -301,12 +298,14 @@ pub(crate) const SWING_LONGEST: f64 = 1e9;
 
 /// Greatest variance of noise that swings.
 ///
-/// Unit: mean squares of the residuals. Source: chosen: more would be there by chance.
+/// Unit: mean squares of the residuals. Source: chosen: more would be there by chance. Test:
+/// `narrow_band_noise_is_found_wherever_it_is`.
 pub(crate) const SWING_MOST: f64 = 2.0;
 
 /// Grid around the most likely noise that swings.
 ///
-/// Unit: logarithms of frequency, time and variance. Source: chosen: about a standard error of each.
+/// Unit: logarithms of frequency, time and variance. Source: chosen: about a standard error of each. Test:
+/// `narrow_band_noise_is_found_wherever_it_is`.
 pub(crate) const SWING_AROUND: [f64; 3] = [0.02, 0.4, 0.4];
 
 /// Maximum number of waves along the travel.
@@ -326,12 +325,13 @@ pub(crate) const NOTHING: f64 = 1e-6;
 
 /// Maximum number of blocks into which the values of a quantity are averaged.
 ///
-/// Unit: blocks. Source: speed.
+/// Unit: blocks. Source: speed. Test: `a_long_log_has_a_bounded_number_of_blocks`.
 pub(crate) const BLOCKS: usize = 700;
 
 /// Maximum number of slow noises at once.
 ///
-/// Unit: states of the filter. Source: two noises describe the residuals tried so far.
+/// Unit: states of the filter. Source: two noises describe the residuals tried so far. Test:
+/// `a_filter_agrees_with_the_covariance_of_its_noise`.
 pub(crate) const SLOW_NOISES: usize = 2;
 
 /// Least number of waves in the travel: an error that does not repeat is one of a law, not of a place.
@@ -342,7 +342,7 @@ pub(crate) const FEWEST_WAVES: f64 = 2.0;
 /// Share of the travel that must be passed in both directions: the error of a law changes with the direction, that of a
 /// place does not.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `a_wave_must_be_seen_in_both_directions`.
 pub(crate) const BOTH_WAYS: f64 = 0.5;
 
 /// Step of the wave numbers that are tried.
@@ -353,12 +353,12 @@ pub(crate) const WAVE_STEP: f64 = 0.5;
 
 /// Maximum number of wave numbers that are tried.
 ///
-/// Unit: 1. Source: speed.
+/// Unit: 1. Source: speed. Test: `a_long_travel_has_a_bounded_number_of_waves`.
 pub(crate) const MOST_WAVE_NUMBERS: usize = 200;
 
 /// Halvings of the step around the best wave number.
 ///
-/// Unit: halvings. Source: chosen.
+/// Unit: halvings. Source: chosen. Test: `a_wave_between_those_that_are_tried_is_found`.
 pub(crate) const WAVE_HALVINGS: usize = 4;
 
 /// Gain in log-likelihood that waves must have beyond the logarithm of the number tried.
@@ -368,12 +368,12 @@ pub(crate) const WAVE_CLEAR: f64 = 6.0;
 
 /// Maximum number of classes of speed with a size of noise each.
 ///
-/// Unit: classes. Source: chosen.
+/// Unit: classes. Source: chosen. Test: `noise_that_grows_with_speed_has_its_size_in_each_class`.
 pub(crate) const SPEED_CLASSES: usize = 6;
 
 /// Least number of blocks in a class of speed.
 ///
-/// Unit: blocks. Source: chosen.
+/// Unit: blocks. Source: chosen. Test: `classes_have_a_dozen_blocks`.
 pub(crate) const FEWEST_BLOCKS: usize = 12;
 
 /// Speed below which a block is at rest, relative to the greatest.
@@ -383,12 +383,12 @@ pub(crate) const BLOCK_AT_REST: f64 = 0.01;
 
 /// Least noise of a class of speed, relative to that of all.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `values_that_are_exact_have_a_hundredth_of_the_noise`.
 pub(crate) const LEAST_SIZE: f64 = 0.01;
 
 /// Gain in log-likelihood that classes of speed must have.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `even_noise_has_no_classes`.
 pub(crate) const CLASSES_CLEAR: f64 = 3.0;
 
 // trust: what may be believed
@@ -419,7 +419,8 @@ pub(crate) const SHARE_LOST: f64 = 0.1;
 
 /// Singular values below this share of the greatest are rounding.
 ///
-/// Unit: 1. Source: differences are good to about 1e-9 of the largest column.
+/// Unit: 1. Source: differences are good to about 1e-9 of the largest column. Test:
+/// `a_direction_within_rounding_is_none`.
 pub(crate) const SINGULAR_ROUNDING: f64 = 1e-8;
 
 /// Maximum iterations of a singular value decomposition.
@@ -806,7 +807,7 @@ pub(crate) const RESIDUAL_FORCE_NOISE: f64 = 0.3;
 
 /// Speed below which the cart counts as at rest, relative to its greatest; friction is not determined there.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `a_force_that_is_missing_is_seen`.
 pub(crate) const CART_AT_REST: f64 = 0.02;
 
 /// Least number of rows to which the start of a held-out log is fitted.
@@ -975,7 +976,7 @@ pub(crate) const MOST_BREAKAWAY: f64 = 4.0;
 
 /// Stribeck velocity at which a search begins, relative to the greatest speed.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `a_stribeck_curve_begins_far_below_the_greatest_speed`.
 pub(crate) const STRIBECK_FALL: f64 = 0.05;
 
 /// Deflection of bristles at which a search begins.
@@ -1133,8 +1134,7 @@ pub(crate) const CAUSE_ERRORS: f64 = 4.0;
 
 /// Share of the squared residuals from which on an element that the model lacks is a warning, known or not.
 ///
-/// Unit: 1. Source: chosen: 0.8 of the residuals are left. Tests: `a_missing_spring_is_named` and
-/// `what_a_gantry_lacks_is_a_warning`.
+/// Unit: 1. Source: chosen: 0.8 of the residuals are left. Test: `what_a_gantry_lacks_is_a_warning`.
 pub(crate) const CAUSE_WARNS: f64 = 0.36;
 
 /// Share of the squared residuals from which on an element explains parts of a log that stand out.
@@ -1395,7 +1395,7 @@ pub(crate) const MAP_SECTIONS: usize = 15;
 
 /// Rounds in which wave numbers are refined one after the other.
 ///
-/// Unit: rounds. Source: chosen.
+/// Unit: rounds. Source: chosen. Test: `sines_close_together_are_refined_to_their_own_wave_numbers`.
 pub(crate) const MAP_ROUNDS: usize = 3;
 
 /// Neighbours on either side, at distances of the reciprocal of the mapped travel, from which the noise at a wave
@@ -1407,7 +1407,7 @@ pub(crate) const MAP_NEIGHBOURS: i32 = 2;
 
 /// Most periodic components.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `of_many_sines_the_eight_largest_are_named`.
 pub(crate) const MAP_WAVES: usize = 8;
 
 /// Least periods within the mapped travel of what is called periodic.
@@ -1433,17 +1433,19 @@ pub(crate) const MAP_HALF: f64 = 0.4;
 
 /// Difference of wave numbers up to which a period matches one of the machine, where the noise makes it no larger.
 ///
-/// Unit: reciprocals of the mapped travel. Source: chosen: a pulley's radius is known to a per cent.
+/// Unit: reciprocals of the mapped travel. Source: chosen: a pulley's radius is known to a per cent. Test:
+/// `a_period_is_that_of_a_pulley_to_a_twentieth_of_a_period_per_travel`.
 pub(crate) const MAP_MATCH: f64 = 0.05;
 
 /// Deviation of the Gaussian that smooths a log, along the travel.
 ///
-/// Unit: distances of the points. Source: chosen: it then resolves what the points do.
+/// Unit: distances of the points. Source: chosen: it then resolves what the points do. Test:
+/// `a_log_is_smoothed_over_less_than_the_distance_of_points`.
 pub(crate) const MAP_SMOOTHING: f64 = 0.25;
 
 /// Loss of amplitude at the shortest period that a map resolves.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `the_shortest_period_loses_a_tenth_of_its_amplitude`.
 pub(crate) const MAP_LOSS: f64 = 0.1;
 
 /// Speed at which a pass begins and ends.
@@ -1458,7 +1460,7 @@ pub(crate) const MAP_LENGTH: f64 = 0.8;
 
 /// Least rows of a pass for each point.
 ///
-/// Unit: rows. Source: chosen.
+/// Unit: rows. Source: chosen. Test: `a_point_has_four_rows_and_a_quarter_of_a_degree_of_freedom`.
 pub(crate) const MAP_ROWS: usize = 4;
 
 /// Least points of a map.
@@ -1468,7 +1470,7 @@ pub(crate) const MAP_POINTS: usize = 16;
 
 /// Degrees of freedom of the residuals of a pass, relative to its points: neighbours share noise.
 ///
-/// Unit: 1. Source: chosen.
+/// Unit: 1. Source: chosen. Test: `a_point_has_four_rows_and_a_quarter_of_a_degree_of_freedom`.
 pub(crate) const MAP_FREEDOM: f64 = 0.25;
 
 /// Points on either side whose scatter is that of a point.

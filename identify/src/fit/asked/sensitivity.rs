@@ -3,7 +3,7 @@
 use super::problem::Problem;
 use super::residuals::{Bounds, Differences, Step};
 use super::run::{Extra, FittedLog, Nuisance, between, heading_of, per_position};
-use crate::fit::limits::{EQUATION_STEP, START_STEP};
+use crate::fit::limits::EQUATION_STEP;
 use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::mechanism::Mechanism;
@@ -153,7 +153,8 @@ impl Problem<'_> {
                 _,
             )) => None,
             Some((Nuisance::StartPosition(_) | Nuisance::StartSpeed(_), _)) => {
-                Some(Variable::central(START_STEP, |by| begun(x[j] + by)))
+                // The state is linear in it: any step is exact.
+                Some(Variable::central(1.0, |by| begun(x[j] + by)))
             }
             None | Some((Nuisance::InputGain(_), _)) => {
                 let steps = Differences::Coarse(x.iter().map(|x| EQUATION_STEP * x.abs().max(1.0)).collect());

@@ -407,4 +407,17 @@ mod tests {
             assert!((bend / 20e-6 - 1.0).abs() < 1e-9, "{body}: {bend}");
         }
     }
+
+    /// Curves of friction begin to fall within speeds of which a log has many.
+    #[test]
+    fn a_stribeck_curve_begins_far_below_the_greatest_speed() {
+        let case = Case::from_text("axis.toml", TEMPLATE).unwrap();
+        let from = &case.machine.cart.friction;
+        for (law, kind) in [(FrictionLaw::Stribeck, "stribeck"), (FrictionLaw::LuGre, "lugre")] {
+            let (table, keys) = table(&case, law, false, from, 0.8, ("cart", "cart"));
+            let velocity = table[kind].as_inline_table().unwrap()["velocity"].as_float().unwrap();
+            assert!((0.01..0.1).contains(&(velocity / 0.8)), "{velocity}");
+            assert!(keys.contains(&format!("{kind}.velocity")), "{keys:?}");
+        }
+    }
 }

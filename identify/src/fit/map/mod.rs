@@ -405,4 +405,49 @@ mod tests {
         let more = 1.0 / (1.0 - (0.5 / (period * first)).powi(2));
         assert!(limit == Limit::Resonance && (more - 1.1).abs() < 1e-9, "{period} {more}");
     }
+
+    /// A pass each way over `length` in `rows` rows; the force is one along the travel and a friction of its own.
+    fn there_and_back(length: f64, rows: u32, along: &dyn Fn(f64) -> f64, friction: &dyn Fn(f64) -> f64) -> Vec<Pass> {
+        let pass = |is_forward: bool| {
+            let row = |k: u32| {
+                let x = length * f64::from(k) / f64::from(rows - 1);
+                [x, along(x) + if is_forward { friction(x) } else { -friction(x) }]
+            };
+            Pass { is_forward, rows: (0..rows).map(row).collect(), speed: 0.05, smoothing: 1e-9 }
+        };
+        vec![pass(true), pass(false)]
+    }
+
+    /// Neighbouring points share rows and noise: of 16 points of two passes four degrees of freedom are counted, so
+    /// that a band is 2.78 standard errors wide to each side.
+    #[test]
+    fn a_point_has_four_rows_and_a_quarter_of_a_degree_of_freedom() {
+        let case = Case::from_text("axis.toml", TEMPLATE).unwrap();
+        // Friction that differs by ±0.1 N from point to point: 0.1 N is the standard error of their mean force.
+        let uneven = |x: f64| {
+            let (place, share) = ((15.0 * x / 0.3).floor(), (15.0 * x / 0.3).fract());
+            let sign = if place % 2.0 == 0.0 { 1.0 } else { -1.0 };
+            2.0 + 0.1 * sign * (1.0 - 2.0 * share)
+        };
+        let map = of_passes(&case, there_and_back(0.3, 64, &|_| 0.0, &uneven)).unwrap();
+        assert_eq!(map.points.len(), 16);
+        for Point { band: [low, high], .. } in &map.points {
+            assert!((0.5 * (high - low) / 0.1 - 2.776).abs() < 0.02, "{low} {high}");
+        }
+    }
+
+    /// A pulley whose radius is known to a per cent is still recognised in the period of a force, and one with 5 %
+    /// more circumference is not.
+    #[test]
+    fn a_period_is_that_of_a_pulley_to_a_twentieth_of_a_period_per_travel() {
+        let case = Case::from_text("axis.toml", TEMPLATE).unwrap();
+        let turn = 2.0 * PI * case.machine.pulley_radius;
+        let named = |share: f64| {
+            let along = |x: f64| (2.0 * PI * x / (turn * share)).sin();
+            let map = of_passes(&case, there_and_back(4.0 * turn, 1200, &along, &|_| 2.0)).unwrap();
+            assert_eq!(map.components.len(), 1, "{share}");
+            !map.components[0].origins.is_empty()
+        };
+        assert!(named(1.0) && named(1.01) && !named(1.05));
+    }
 }

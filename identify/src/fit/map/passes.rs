@@ -189,6 +189,9 @@ fn usual(values: impl Iterator<Item = f64> + Clone) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::case::{Case, TEMPLATE};
+    use crate::log::Output;
+    use crate::signal::Hold;
 
     #[test]
     fn the_least_squares_line_of_a_broken_line_is_that_line() {
@@ -206,5 +209,35 @@ mod tests {
         }
         // Points beyond the rows have none.
         assert!(pass.line(low, step, nodes.len() + 2).is_none());
+    }
+
+    /// A Gaussian of a quarter of their distance keeps what a line through the points can follow; the widths that are
+    /// tried are up to 1.5 apart.
+    #[test]
+    fn a_log_is_smoothed_over_less_than_the_distance_of_points() {
+        let machine = Case::from_text("axis.toml", TEMPLATE).unwrap().machine;
+        let (speed, every, rows) = (0.05, 1e-3, 8000);
+        let place = |k: usize| speed * every * k.min(rows - k) as f64;
+        let position =
+            Output { quantity: Quantity::CartPosition, absolute: false, values: (0..=rows).map(place).collect() };
+        let log = Log {
+            name: "slow".into(),
+            file: Default::default(),
+            time: (0..=rows).map(|k| every * k as f64).collect(),
+            inputs: vec![vec![1.0; rows + 1]],
+            added: None,
+            hold: Hold::Zero,
+            reference: None,
+            outputs: vec![position],
+            ended: None,
+        };
+        for step in [0.7e-3, 1.3e-3, 2.9e-3] {
+            let all = passes(&machine, &log, step).unwrap();
+            assert_eq!(all.len(), 2);
+            for Pass { smoothing, .. } in all {
+                let share = smoothing / step;
+                assert!((0.16..0.27).contains(&share), "{step}: {share}");
+            }
+        }
     }
 }

@@ -284,4 +284,31 @@ mod tests {
         let none = search(&residuals[0], &noise, 100.0);
         assert!(!none.changes && none.waves.is_empty() && none.visible < 0.1);
     }
+
+    /// Sines three halves of a period per length apart, each begun where the other displaces it to.
+    #[test]
+    fn sines_close_together_are_refined_to_their_own_wave_numbers() {
+        let x = |j: usize| STEP * j as f64;
+        let value = |j| 3.0 * (2.0 * PI * 25.3 * x(j)).sin() + (2.0 * PI * 26.8 * x(j) + 0.4).cos();
+        let values: Vec<f64> = (0..250).map(value).collect();
+        for off in [-0.11, 0.11] {
+            let mut numbers = [25.3 + off, 26.8 - off];
+            refine(&values, &mut numbers, STEP, 0.25);
+            assert!((numbers[0] - 25.3).abs() < 5e-3 && (numbers[1] - 26.8).abs() < 5e-3, "{off}: {numbers:?}");
+        }
+    }
+
+    #[test]
+    fn of_many_sines_the_eight_largest_are_named() {
+        let sine = |k: usize, x: f64| (2.0 * PI * (10.0 + 7.0 * k as f64) * x).sin() * (2.0 - 0.1 * k as f64);
+        let values: Vec<f64> = (0..250).map(|j| (0..11).map(|k| sine(k, STEP * j as f64)).sum()).collect();
+        let residuals: Vec<Vec<f64>> =
+            (0..4).map(|seed| (0..250).map(|j| 1e-3 * ((j * j + seed * j) as f64).sin()).collect()).collect();
+        let noise = Noise { residuals: &residuals, freedom: 4.0, weight: 1.0, step: STEP };
+        let found = search(&values, &noise, 100.0).waves;
+        assert_eq!(found.len(), 8);
+        for (k, wave) in found.iter().enumerate() {
+            assert!((wave.number[0] - (10.0 + 7.0 * k as f64)).abs() < 0.2, "{k}: {wave:?}");
+        }
+    }
 }

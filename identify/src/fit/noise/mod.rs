@@ -356,7 +356,8 @@ impl Estimate {
             told.as_ref().filter(is_possible).map_or(f64::NEG_INFINITY, |told| told.weight)
         };
         let mut best: Option<([f64; 3], f64)> = None;
-        let (mut frequency, mut tried) = (SWINGS_IN_LOG * TAU / longest, 0);
+        let slowest = SWINGS_IN_LOG * TAU / longest;
+        let (mut frequency, mut tried) = (slowest, 0);
         while frequency * interval < SWING_FASTEST {
             for power in SWING_POWERS {
                 let time = 1.0 / (SWING_DAMPING * frequency);
@@ -375,7 +376,8 @@ impl Estimate {
         for _ in 0..SWING_ROUNDS {
             for ((step, first), way) in steps.iter_mut().zip(SWING_STEPS).zip(SWING_WAYS) {
                 let near = [*step, -*step].map(|step| std::array::from_fn(|j| at[j] + step * way[j]));
-                let near = near.into_iter().filter(|next: &[f64; 3]| next[1] <= longest_time);
+                let is_swing = |next: &[f64; 3]| next[0] >= slowest.ln() && next[1] <= longest_time;
+                let near = near.into_iter().filter(is_swing);
                 let better = near.map(|next| (next, weight(&of(next)))).find(|(_, own)| *own > most);
                 match better {
                     Some(next) => ((at, most), *step) = (next, first.min(*step / SWING_SHRINKS)),
@@ -634,6 +636,8 @@ fn influence(all: &[Series], globals: usize, inverse: &DMatrix<f64>) -> Vec<Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand_pcg::Pcg64;
+    use rand_pcg::rand_core::SeedableRng;
 
     #[test]
     fn a_zero_is_found_wherever_it_is() {
@@ -683,5 +687,87 @@ mod tests {
         // Independent quantities: √(3² + 4²) = 5
         let both = half_width(&[white(9.0, 0.0), white(16.0, 0.0)], &one);
         assert!((both - 5.0 * 1.95996).abs() < 2e-3, "{both}");
+    }
+
+    /// Residuals of a log at intervals of 1 ms as the noise of one quantity.
+    fn noise(rows: Vec<f64>) -> Estimate {
+        let value = (0..rows.len()).map(|k| 1e-3 * k as f64).collect();
+        let influence = vec![Vec::new()];
+        let series = vec![Series::residuals(rows, value)];
+        Estimate { quantity: Quantity::CartPosition, weight: 1.0, step: 0.0, series, globals: 0, influence }
+    }
+
+    /// Rows of white noise of deviation one, and of slow noises.
+    fn drawn(seed: u64, rows: usize, slow: &[Slow]) -> Vec<f64> {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let mut normal = || crate::chance::normal(&mut random);
+        let mut states: Vec<[f64; 2]> =
+            slow.iter().map(|own| [normal(), normal()].map(|x| x * own.variance.sqrt())).collect();
+        let mut row = |_| {
+            for (state, own) in states.iter_mut().zip(slow) {
+                // (x + iy) e^{(iω − 1/τ)Δ}, and fresh noise of σ² (1 − e^{−2Δ/τ})
+                let (sin, cos) = (1e-3 * own.frequency).sin_cos();
+                let decay = (-1e-3 / own.time).exp();
+                let fresh = (own.variance * (1.0 - decay * decay)).sqrt();
+                let [x, y] = *state;
+                *state =
+                    [decay * (cos * x - sin * y) + fresh * normal(), decay * (sin * x + cos * y) + fresh * normal()];
+            }
+            normal() + states.iter().map(|state| state[0]).sum::<f64>()
+        };
+        (0..rows).map(&mut row).collect()
+    }
+
+    /// Narrow-band noise of any frequency, width and size is found among those that are tried, by steps from the best.
+    #[test]
+    fn narrow_band_noise_is_found_wherever_it_is() {
+        for (seed, frequency) in [75.0, 160.0, 390.0, 800.0, 1330.0, 2400.0].into_iter().enumerate() {
+            for (damping, variance) in [(0.2, 2.0), (0.2, 60.0), (0.02, 2.0), (0.02, 3000.0), (1e-3, 60.0), (1e-4, 3e3)]
+            {
+                let truth = Slow { variance, time: 1.0 / (damping * frequency), frequency };
+                let estimate = noise(drawn(seed as u64, 700, &[truth]));
+                let all = estimate.swinging([1e-3, 0.7], 1.0);
+                let found = best(&all).unwrap().slow[0];
+                let likely = |slow: Slow| estimate.likelihood(&[slow]).unwrap().weight;
+                assert!(likely(found) > likely(truth) - 0.5, "{truth:?}: {found:?}");
+                // What is averaged over stands about a standard error around the best, of its time and of its variance.
+                if (damping, variance) == (0.02, 2.0) {
+                    let lost = [-3, 3, -1, 1].map(|by| likely(found) - likely(all[(13 + by) as usize].slow[0]));
+                    let most = lost.into_iter().fold(0.0, f64::max);
+                    assert!((0.3..4.0).contains(&most), "{truth:?}: {lost:?}");
+                }
+            }
+        }
+    }
+
+    /// Two slow noises of different times are found, each beside the other; never two of nearly one time, whose
+    /// variances nothing tells apart.
+    #[test]
+    fn two_slow_noises_are_told_apart() {
+        let [fast, slow] = [(4e-3, 6.0), (0.12, 30.0)].map(|(time, variance)| Slow { variance, time, frequency: 0.0 });
+        let mut both = 0;
+        for seed in 0..6 {
+            let told = noise(drawn(seed, 700, &[fast, slow])).told();
+            for one in told.iter().filter(|one| one.slow.len() == 2) {
+                let ratio = one.slow[0].time / one.slow[1].time;
+                assert!(ratio.ln().abs() > 0.9, "{seed}: {:?}", one.slow);
+            }
+            let mut times: Vec<f64> = best(&told).unwrap().slow.iter().map(|own| own.time).collect();
+            times.sort_by(f64::total_cmp);
+            both += usize::from(matches!(times[..], [a, b] if (1e-3..1e-2).contains(&a) && (0.04..0.4).contains(&b)));
+        }
+        assert!(both >= 4, "{both} of 6");
+    }
+
+    /// Noise that swings has at least five periods in the log: slower ones are a drift.
+    #[test]
+    fn a_slow_wave_is_a_drift() {
+        for periods in [1.5, 2.5, 3.5] {
+            let mut rows = drawn(1, 700, &[]);
+            rows.iter_mut().enumerate().for_each(|(k, row)| *row += 3.0 * (periods * TAU * k as f64 / 700.0).sin());
+            let told = noise(rows).told();
+            let frequency = best(&told).unwrap().slow[0].frequency;
+            assert!(frequency == 0.0 || frequency > 4.9 * TAU / 0.7, "{periods}: {frequency}");
+        }
     }
 }

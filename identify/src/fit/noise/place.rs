@@ -110,16 +110,7 @@ mod tests {
         let value: Vec<f64> = (0..n).map(|k| 0.002 * f64::from(k)).collect();
         let rows: Vec<f64> = value.iter().map(|x| 0.3 * (kappa * x).cos() - 0.4 * (kappa * x).sin()).collect();
         let square: f64 = rows.iter().map(|r| r * r).sum();
-        let series = Series {
-            moved: Vec::new(),
-            own: 0,
-            more: 0,
-            rows,
-            gain: vec![1.0; n as usize],
-            time: value.clone(),
-            speed: value.clone(),
-            value,
-        };
+        let series = Series::residuals(rows, value);
         let (gained, amplitude) = gain(&[series], &[], &[], kappa);
         assert!((amplitude - 0.5).abs() < 1e-12, "{amplitude}");
         // It explains all: ½ Σ r²
@@ -133,22 +124,49 @@ mod tests {
             let ways: Vec<f64> = (0..100).map(|k| 0.004 * f64::from(k)).collect();
             let value: Vec<f64> = ways.iter().chain(ways.iter().rev()).map(|way| unit * way).collect();
             let row = |x: &f64| 0.3 * (40.0 * x / unit).cos() + 0.01 * (123.0 * x / unit).sin();
-            let n = value.len();
-            let series = Series {
-                moved: Vec::new(),
-                own: 0,
-                more: 0,
-                rows: value.iter().map(row).collect(),
-                gain: vec![1.0; n],
-                time: value.clone(),
-                speed: value.clone(),
-                value,
-            };
-            let found = wave(&[series], &[], &[], 1e-4).unwrap();
+            let found = wave(&[Series::residuals(value.iter().map(row).collect(), value)], &[], &[], 1e-4).unwrap();
             assert!((found.kappa * unit / 40.0 - 1.0).abs() < 0.02, "{unit}: {}", found.kappa);
             assert!((found.travel / unit - 0.396).abs() < 1e-9 && (found.amplitude - 0.3).abs() < 0.02);
             found.tried
         });
         assert!(found[0] > 10 && found.iter().all(|tried| tried.abs_diff(found[0]) <= 1), "{found:?}");
+    }
+
+    /// Residuals of 0.3 cos κx at places x, with the wave that is found in them.
+    fn found(kappa: f64, places: Vec<f64>) -> Option<PeriodicError> {
+        let rows = places.iter().map(|x| 0.3 * (kappa * x).cos()).collect();
+        wave(&[Series::residuals(rows, places)], &[], &[], 1e-4)
+    }
+
+    /// There and back over `travel`, with this many rows each way.
+    fn both_ways(travel: f64, rows: u32) -> Vec<f64> {
+        let there = || (0..=rows).map(|k| travel * f64::from(k) / f64::from(rows));
+        there().chain(there().rev()).collect()
+    }
+
+    /// Wave numbers are tried half a wave in the travel apart, and then around the best: one in the middle between two
+    /// is found to a thirtieth of a wave.
+    #[test]
+    fn a_wave_between_those_that_are_tried_is_found() {
+        for waves in [4.34, 6.22, 9.66] {
+            let found = found(TAU * waves, both_ways(1.0, 200)).unwrap();
+            assert!((found.kappa / TAU - waves).abs() < 0.03, "{waves}: {}", found.kappa / TAU);
+        }
+    }
+
+    /// The search takes time in proportion to the wave numbers that are tried.
+    #[test]
+    fn a_long_travel_has_a_bounded_number_of_waves() {
+        assert_eq!(found(TAU * 40.0, both_ways(1.0, 1000)).unwrap().tried, 200);
+    }
+
+    /// An error that was seen in one direction is one of a law as well.
+    #[test]
+    fn a_wave_must_be_seen_in_both_directions() {
+        let places = |back: f64| {
+            let all = both_ways(1.0, 200).into_iter().enumerate();
+            all.filter(|(k, x)| *k <= 200 || *x > 1.0 - back).map(|(_, x)| x).collect()
+        };
+        assert!(found(60.0, places(0.4)).is_none() && found(60.0, places(0.6)).is_some());
     }
 }

@@ -91,3 +91,70 @@ fn by_time(all: &[Series]) -> Option<Vec<usize>> {
     }
     Some(classes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chance::normal;
+    use rand_pcg::Pcg64;
+    use rand_pcg::rand_core::SeedableRng;
+
+    /// Noise of this deviation at each of `n` speeds, evenly from 0 to 1 m/s and in no order along the log.
+    fn noise(seed: u64, n: usize, deviation: impl Fn(f64) -> f64) -> Series {
+        let mut random = Pcg64::seed_from_u64(seed);
+        let speeds: Vec<f64> = (0..n).map(|k| (k * 37 % n) as f64 / n as f64).collect();
+        Series::residuals(speeds.iter().map(|v| deviation(*v) * normal(&mut random)).collect(), speeds)
+    }
+
+    fn found(series: Series) -> Option<Vec<f64>> {
+        scales(&[series], &[]).map(|mut all| all.remove(0))
+    }
+
+    /// Noise that grows with speed has five classes, whose sizes are those of their noise.
+    #[test]
+    fn noise_that_grows_with_speed_has_its_size_in_each_class() {
+        let series = noise(1, 1000, |v| 0.2 + 2.0 * v);
+        let square = |from: f64, to: f64| ((0.2 + 2.0 * to).powi(3) - (0.2 + 2.0 * from).powi(3)) / (6.0 * (to - from));
+        let speeds = series.speed.clone();
+        let mut sizes = found(series).unwrap();
+        // Classes have equal numbers of blocks that move; those at their edges are left out.
+        for (v, size) in speeds.iter().zip(&sizes).filter(|(v, _)| (0.05..0.95).contains(&(5.0 * **v).fract())) {
+            let class = (5.0 * v).floor() / 5.0;
+            let own = (square(class, class + 0.2) / square(0.0, 1.0)).sqrt();
+            // Two hundred blocks determine a size to 5 %.
+            assert!((size / own - 1.0).abs() < 0.2, "{v}: {size} {own}");
+        }
+        sizes.sort_by(f64::total_cmp);
+        sizes.dedup();
+        assert_eq!(sizes.len(), 5);
+    }
+
+    /// Classes that are there by chance would widen intervals for nothing; noise 1.7 times as large in the faster half
+    /// is seen in most logs of 300 blocks.
+    #[test]
+    fn even_noise_has_no_classes() {
+        let seen = |logs: u64, faster: f64| {
+            let deviation = |v: f64| if v > 0.5 { faster } else { 1.0 };
+            (0..logs).filter(|seed| found(noise(*seed, 300, deviation)).is_some()).count()
+        };
+        let (by_chance, most) = (seen(400, 1.0), seen(100, 1.7));
+        assert!(by_chance <= 4 && most >= 70, "{by_chance} of 400, {most} of 100");
+    }
+
+    /// Of few blocks nothing can be said.
+    #[test]
+    fn classes_have_a_dozen_blocks() {
+        let steep = |v: f64| if v > 0.5 { 20.0 } else { 1.0 };
+        assert!(found(noise(1, 50, steep)).is_none());
+        assert!(found(noise(1, 80, steep)).is_some());
+    }
+
+    /// A log whose first half is exact, as one at rest before an encoder counts: its size there is not zero, which
+    /// would decide for classes whatever the rest is.
+    #[test]
+    fn values_that_are_exact_have_a_hundredth_of_the_noise() {
+        let sizes = found(noise(1, 300, |v| if v > 0.5 { 1.0 } else { 0.0 })).unwrap();
+        let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
+        assert!((least - 0.01).abs() < 1e-12, "{least}");
+    }
+}

@@ -58,6 +58,16 @@ impl Series {
     }
 }
 
+#[cfg(test)]
+impl Series {
+    /// Residuals of one log at intervals of 1 ms, without a Jacobian, at these values of the model.
+    pub fn residuals(rows: Vec<f64>, value: Vec<f64>) -> Self {
+        let time = (0..rows.len()).map(|k| 1e-3 * k as f64).collect();
+        let (gain, speed) = (vec![1.0; rows.len()], value.clone());
+        Self { moved: Vec::new(), own: 0, more: 0, rows, gain, time, value, speed }
+    }
+}
+
 /// The rows of a quantity, in blocks that share a rounding error and are at most [`BLOCKS`] in number; and the greatest
 /// weight of a value. Columns from `globals` on concern one run.
 pub(super) fn series(
@@ -134,4 +144,33 @@ pub(super) fn series(
         all.push(series);
     }
     (all, most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::asked::problem::tests::case;
+
+    /// The filter takes time in proportion to the blocks: a log of any length has at most 700 and one that is not full,
+    /// each with the sum of its residuals over the root of their number.
+    #[test]
+    fn a_long_log_has_a_bounded_number_of_blocks() {
+        let (case, plan) = case(false);
+        let mut problem = Problem::new(&case, &plan).unwrap();
+        let n = 20_000;
+        let run = &mut problem.runs[0];
+        run.time = (0..n).map(|k| 1e-3 * k as f64).collect();
+        run.seen.truncate(1);
+        let seen = &mut run.seen[0];
+        (seen.weights, seen.values) = (vec![2.0; n], vec![0.0; n]);
+        (seen.repeats, seen.alike) = (vec![1.0; n], vec![1.0; n]);
+        let quantity = seen.quantity;
+        let (all, weight) = series(&problem, quantity, &vec![1.0; n], &DMatrix::zeros(n, 0), 0);
+        let series = &all[0];
+        assert_eq!((all.len(), weight), (1, 2.0));
+        assert!((600..=701).contains(&series.time.len()), "{}", series.time.len());
+        let rows = n as f64 / series.time.len() as f64;
+        assert!(series.gain[..600].iter().all(|gain| (gain * gain - rows).abs() < 1.0), "{:?}", series.gain[0]);
+        assert!(series.rows.iter().zip(&series.gain).all(|(row, gain)| (row - gain).abs() < 1e-9));
+    }
 }

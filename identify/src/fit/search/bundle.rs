@@ -133,19 +133,19 @@ fn descend(
     let first = problem.jacobian(&best.x, &best.residuals, at.bounds, &Differences::Central)?;
     let mut pieces = vec![at.piece(best, &first)?];
     let mut trial = best.clone();
-    let mut taken = 1;
+    let (mut taken, mut is_stuck) = (1, false);
     loop {
         let cost = unit * best.cost;
         let promise = Promise::new(&pieces, &u, cost);
         let expected = (2.0 * promise.fall).sqrt();
-        if expected <= tolerance || taken >= most {
+        if expected <= tolerance || taken >= most || is_stuck {
             best.iterations += taken;
             return at.mean_jacobian(problem, &pieces, (&promise.weights, expected));
         }
         if watch(&best.x, best.cost) == Flow::Stop {
             return None;
         }
-        let mut length = 1.0;
+        let (mut length, known) = (1.0, pieces.len());
         for _ in 0..HALVINGS {
             taken += 1;
             best.evaluations += 1;
@@ -171,6 +171,8 @@ fn descend(
             }
             length *= 0.5;
         }
+        // The model cannot be run at any of these points: the same pieces promise the same step again.
+        is_stuck = pieces.len() == known;
         forget(&mut pieces, &u, unit * best.cost, &promise.weights);
     }
 }
@@ -334,6 +336,8 @@ mod tests {
         assert!(at.linearise(&mut Walled, &Differences::Central, None));
         Bundle::default().climb(&mut at, &mut Walled, &mut |_, _| Flow::Continue);
         assert!((at.best.x[0] - (1.0 - 1.0 / 1024.0)).abs() < 1e-6, "{}", at.best.x[0]);
+        // At the wall the same steps are not tried again.
+        assert!(at.best.evaluations < 30, "{}", at.best.evaluations);
     }
 
     /// Of thirty pieces, two variables leave twelve: the new one, the one that determined the last step, and those

@@ -92,6 +92,25 @@ fn projected(jacobian: &DMatrix<f64>, n: usize) -> Option<DMatrix<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fit::asked::problem::tests::case;
+    use crate::fit::asked::residuals::Residuals;
+
+    /// Differences are good to about 1e-9 of the largest column: what is smaller than ten times that is rounding.
+    #[test]
+    fn a_direction_within_rounding_is_none() {
+        let (case, mut plan) = case(false);
+        plan.free.push("cart.mass".into());
+        let problem = Problem::new(&case, &plan).unwrap();
+        let x = problem.start();
+        let machine = problem.stage_at(&x);
+        let whole: Vec<f64> = (0..2).map(|j| problem.whole(&machine, j, x[j])).collect();
+        let alive = |share: f64| {
+            let column = |j: usize, k: usize| if k == j { [1.0, share][j] / whole[j] } else { 0.0 };
+            let jacobian = DMatrix::from_fn(problem.rows(), 2, |k, j| column(j, k));
+            Directions::new(&problem, &jacobian, &x, &[0, 1]).unwrap().alive
+        };
+        assert_eq!([1e-7, 2e-8, 5e-9, 0.0].map(alive), [2, 2, 1, 1]);
+    }
 
     /// Of forty parameters, more than most fits have.
     #[test]
