@@ -32,6 +32,9 @@ pub(super) trait AtInstant {
     fn motions(&self) -> [[f64; 2]; 3];
 }
 
+/// A limit, and the quantity that it bounds.
+pub(super) type Limit<'l, T> = (f64, &'l dyn Fn(&T) -> f64);
+
 /// Values along references.
 pub(super) struct Course<'a, T> {
     at: Box<dyn Fn(f64) -> T + 'a>,
@@ -54,11 +57,7 @@ impl<'a, T: AtInstant> Course<'a, T> {
 
     /// True if a value `at` the instants of these references exceeds its limit somewhere. Segments behind the first one
     /// with such a value are not evaluated.
-    pub fn exceeds(
-        (profiles, has_lines): (&[Profile], bool),
-        at: impl Fn(f64) -> T + 'a,
-        limits: &[(f64, &dyn Fn(&T) -> f64)],
-    ) -> bool {
+    pub fn exceeds((profiles, has_lines): (&[Profile], bool), at: impl Fn(f64) -> T + 'a, limits: &[Limit<T>]) -> bool {
         let ends = [0.0, Profile::last_rest(profiles)].map(|time| vec![at(time)]);
         let mut course = Self { at: Box::new(at), segments: ends.into() };
         let is_beyond = |course: &Self| limits.iter().any(|(limit, of)| course.is_beyond(*limit, of));

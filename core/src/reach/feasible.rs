@@ -1,7 +1,7 @@
 //! Feasibility of a reference: the requirements on motor, amplifier, belt and travel, and their limits.
 
 use super::compensation::{Compensation, direction};
-use super::course::{AtInstant, Course};
+use super::course::{AtInstant, Course, Limit};
 use super::forward::{Forward, Required};
 use super::pull_out::Curve;
 use crate::design::{Bounds, FeedForward, FeedForwardModel};
@@ -312,8 +312,9 @@ pub(super) fn are_within(machine: &Machine, bounds: Bounds, profiles: &[Profile]
     demanded(machine, bounds, profiles).all(|(needs, demands)| {
         let shares: Vec<_> = demands.iter().map(|demand| |need: &Need| demand.share(need)).collect();
         let of = |demand: &Demand| if is_of_motor(demand.limit) { motor } else { belt };
-        let limits = demands.iter().zip(&shares).map(|(demand, share)| (of(demand), share as &dyn Fn(&Need) -> f64));
-        !Course::exceeds((profiles, has_lines(machine)), needs, &limits.collect::<Vec<_>>())
+        let limits: Vec<Limit<Need>> =
+            demands.iter().zip(&shares).map(|(demand, share)| (of(demand), share as _)).collect();
+        !Course::exceeds((profiles, has_lines(machine)), needs, &limits)
     })
 }
 

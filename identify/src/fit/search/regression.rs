@@ -332,7 +332,7 @@ mod tests {
         let turn = |k: usize| {
             let u = f64::min((k % 140) as f64 / 100.0, 1.0);
             let way = 2.0 * u * u * u * (10.0 - 15.0 * u + 6.0 * u * u);
-            if k / 140 % 2 == 0 { way } else { 2.0 - way }
+            if (k / 140).is_multiple_of(2) { way } else { 2.0 - way }
         };
         let turned: Vec<f64> = (0..1400).map(turn).collect();
         let found = regression(&logged(&turned, &turned)).unwrap();
