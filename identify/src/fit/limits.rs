@@ -1,7 +1,7 @@
 //! Limits and thresholds of the fit, room by room.
 //!
-//! Each has its meaning, its unit (1 for a ratio), its source, and a test of its effect. The source "chosen"
-//! marks a judgement. Other modules declare no such numbers; `tests/rooms.rs` checks this.
+//! Each has its meaning, its unit (1 for a ratio), its source, and a test of its effect. The source "chosen" marks a
+//! judgement. Other modules declare no such numbers; `tests/rooms.rs` checks this.
 
 // asked: what is compared with what
 

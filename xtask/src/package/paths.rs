@@ -21,6 +21,13 @@ pub fn check(file: &Path) -> Result<Vec<u8>, String> {
     }
 }
 
+/// The files in a folder. Errors: one of them holds a path of this machine, or cannot be read.
+pub fn checked(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let files = crate::book::files(folder)?;
+    files.iter().try_for_each(|file| check(file).map(drop))?;
+    Ok(files)
+}
+
 /// The paths that are in a file.
 fn held(bytes: &[u8], paths: &[PathBuf]) -> Vec<String> {
     let is_in = |path: &String| bytes.windows(path.len()).any(|window| window == path.as_bytes());

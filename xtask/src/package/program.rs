@@ -133,9 +133,8 @@ pub fn make(build: &Build, twice: bool, claims: &mut Claims) -> Result<Option<Pr
     if let Some(tried) = tried.as_ref().filter(|_| own_target().is_ok_and(|own| own == triple)) {
         claims.add("its FMU in FMPy", in_importer(&tried.unit(), tried)?);
     }
-    let files = crate::book::files(&folder)?;
-    files.iter().try_for_each(|file| paths::check(file).map(drop))?;
-    claims.add("archive", format!("{} files, no paths of this machine in them", files.len()));
+    let files = paths::checked(&folder)?.len();
+    claims.add("archive", format!("{files} files, no paths of this machine in them"));
     archive(&folder, &places.out.join(format!("{name}.tar.gz")))?;
     Ok(tried)
 }

@@ -78,8 +78,7 @@ fn built(build: &Build, claims: &mut Claims) -> Result<PathBuf, String> {
     // What is in the archive is compressed there.
     let inside = build.places.work.join("wheel-inside");
     unpack(&wheel, &inside)?;
-    let files = crate::book::files(&inside)?;
-    files.iter().try_for_each(|file| super::paths::check(file).map(drop))?;
+    let files = super::paths::checked(&inside)?;
     for wanted in ["LICENSE-MIT", "LICENSE-APACHE", "LICENCES.txt", "sboms/taut.cdx.json"] {
         if !files.iter().any(|file| file.ends_with(wanted)) {
             return Err(format!("{name} has no {wanted}"));
