@@ -5,6 +5,7 @@
  * radius is left. A batch ends when all of its machines rest for good.
  *
  * lanes rows STEPS              positions phi1, x, phi3 of the nominal machine at 5 V, 1001 rows of doubles on standard output
+ * lanes ends STEPS              of machines whose 16 numbers are on standard input, where the carts are after 5 V and after 10 V, m
  * lanes rate STEPS SECONDS SEED batches of machines, each number by +-20 %, 5 V and 10 V for 0.25 s, for so long; simulations and seconds as text
  *
  * gcc -O3 -march=native -ffast-math -DLANES=8 (four doubles in a vector of AVX2: -DLANES=4) */
@@ -129,6 +130,18 @@ int main(int count, char **words) {
         for (int lane = 0; lane < LANES; lane++) set(&machine, lane, nominal);
         simulate(&machine, 5.0, steps, figures, rows, nominal[3]);
         return fwrite(rows, sizeof rows, 1, stdout) != 1;
+    }
+    if (!strcmp(words[1], "ends")) {
+        double p[NUMBERS];
+        for (;;) {
+            for (int i = 0; i < NUMBERS; i++)
+                if (scanf("%lf", &p[i]) != 1) return i != 0;
+            for (int lane = 0; lane < LANES; lane++) set(&machine, lane, p);
+            for (int pulse = 1; pulse <= 2; pulse++) {
+                simulate(&machine, 5.0 * pulse, steps, figures, 0, 0.0);
+                printf("%.17g\n", figures[0][0]);
+            }
+        }
     }
     if (count < 5) return 2;
     uint64_t state = strtoull(words[4], 0, 10);

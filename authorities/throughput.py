@@ -23,7 +23,9 @@ peak force in span 1. All on all processors.
 
 The error is the largest distance of drive pulley, cart and idler positions at any row from those of authority B, for
 the nominal machine at 5 V; taut's own is in speed.py's output. SciPy and CVODE have the loosest tolerance whose error
-is below 1e-6 m. Rates are those of wall time, a few seconds each, and vary with what else the computer does.
+is below 1e-6 m. A fixed step meets the stops of one machine better or worse than those of another, so that C in lanes
+is also run with the fewest steps for which the cart of 95 % of 1000 simulations of drawn machines, and of all of them,
+ends within 4e-7 m of where it does for `taut sweep`, whose rows are within 1e-12 m of the exact solver's. Rates are those of wall time, a few seconds each, and vary with what else the computer does.
 """
 
 from __future__ import annotations
@@ -45,6 +47,9 @@ HERE = Path(__file__).resolve().parent
 PROCESSORS = os.cpu_count() or 1
 SECONDS = 6.0
 TARGET = 1e-6  # m
+# Of the carts of drawn machines, m.
+NEAR = 4e-7
+STEPS = (2, 4, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512)
 TAUT = ["cargo", "run", "--quiet", "--release", "--package", "taut", "--no-default-features", "--example", "sweep", "--"]
 
 
@@ -161,9 +166,34 @@ def lanes_rate(program, steps, seconds):
     return sum(int(done) / float(took) for done, took, _ in told)
 
 
+# The numbers of a machine as lanes.c has them.
+NUMBERS = [
+    *("motor.torque_constant_N_m_A", "motor.back_emf_constant_V_s_rad", "motor.resistance_ohm", "drive_pulley.radius_m"),
+    *("drive_pulley.inertia_kg_m^2", "cart.mass_kg", "idler_pulley.inertia_kg_m^2"),
+    *(f"belt.stiffness.{span}_N_m" for span in range(3)),
+    *("drive_pulley.friction.viscous_N_m_s_rad", "cart.friction.viscous_N_s_m", "idler_pulley.friction.viscous_N_m_s_rad"),
+    *("drive_pulley.friction.coulomb_N_m", "cart.friction.coulomb_N", "idler_pulley.friction.coulomb_N_m"),
+]
+
+
+def drawn(folder):
+    """500 machines, each number by +-20 %, as text, and where their carts end at 5 V and at 10 V by `taut sweep`, m."""
+    file = Path(folder) / "drawn.csv"
+    options = ["--runs", "500", "--vary", "all=20%", "--design", "sobol", "--figures", "final_cart_position"]
+    case = "stages/sollmann-jouaneh/table4.toml"
+    command = ["cargo", "run", "--quiet", "--release", "--package", "taut-cli", "--", "sweep", case, *options, "--out", file]
+    subprocess.run(command, cwd=HERE.parent, capture_output=True, check=True)
+    head, *rows = [line.split(",") for line in file.read_text().splitlines() if not line.startswith("#")]
+    machines = "\n".join(" ".join(row[head.index(name)] for name in NUMBERS) for row in rows)
+    ends = [[float(row[head.index(f"{volts}-v-pulse.final_cart_position_m")]) for volts in (5, 10)] for row in rows]
+    return machines, np.array(ends)
+
+
 def by_lanes(truth, folder):
-    """Name, steps of a row that are near enough, error and program, for vectors of eight and of four numbers."""
+    """Name, error, program and steps of a row, for vectors of eight and of four numbers: the fewest steps by the nominal
+    machine, by most of the drawn ones, and by all."""
     has_512 = "avx512f" in Path("/proc/cpuinfo").read_text()
+    machines, ends = drawn(folder)
     found = []
     for lanes in (8, 4) if has_512 else (4,):
         program = str(Path(folder) / f"lanes{lanes}")
@@ -172,12 +202,16 @@ def by_lanes(truth, folder):
             subprocess.run(["gcc", *options, "-o", program, str(HERE / "lanes.c"), "-lm"], check=True)
         except (OSError, subprocess.CalledProcessError):
             return []
-        for steps in (2, 4, 8, 16, 32, 64):
+        wanted = [("", TARGET), ("95 % ", NEAR), ("all ", NEAR)]
+        for steps in STEPS:
             out = subprocess.run([program, "rows", str(steps)], capture_output=True, check=True).stdout
-            off = error(np.frombuffer(out).reshape(1001, 3), truth)
-            if off < TARGET:
-                found.append((f"C, {lanes} lanes, {steps} steps a ms", steps, off, program))
-                break
+            told = subprocess.run([program, "ends", str(steps)], input=machines, capture_output=True, check=True, text=True)
+            off = np.abs(np.array(told.stdout.split(), float).reshape(ends.shape) - ends)
+            errors = {"": error(np.frombuffer(out).reshape(1001, 3), truth), "95 % ": np.quantile(off, 0.95), "all ": off.max()}
+            for which, most in wanted[:]:
+                if errors[which] <= most:
+                    found.append((f"C, {lanes} lanes, {steps} steps a ms", f"{which}{errors[which]:.1e} m", program, steps))
+                    wanted.remove((which, most))
     return found
 
 
@@ -187,7 +221,7 @@ def in_turns(truth):
     with tempfile.TemporaryDirectory() as folder:
         lanes = by_lanes(truth, folder)
         works = [("taut sweep, 24 figures", None, by_taut), ("taut sweep, 3 figures", None, lambda seconds: by_taut(FIGURES, seconds=seconds))]
-        for name, steps, off, program in lanes:
+        for name, off, program, steps in lanes:
             works.append((name, off, lambda seconds, program=program, steps=steps: lanes_rate(program, steps, seconds)))
         rates = [[] for _ in works]
         for _ in range(TURNS):
@@ -452,13 +486,12 @@ def main():
     rivals = [by_scipy(truth), by_cvode(truth), *by_numba(truth), *by_mujoco(truth), *by_diffrax(truth)] if others else []
     lines = [f"{PROCESSORS} processors; position error at 5 V against authority B; simulations a second, and how many times fewer than taut's", ""]
     for name, off, rate_ in turns:
-        told = f"{'–':>10}" if off is None else f"{off:8.1e} m"
-        lines.append(f"{name:34} {told} {rate_:10.0f} {mine / rate_:9.2f}")
+        lines.append(f"{name:34} {off or '–':>14} {rate_:10.0f} {mine / rate_:9.2f}")
     if len(turns) == 2:
         lines.append("C in lanes: not measured (no compiler)")
     for rival in filter(None, rivals):
         name, off, rate_ = rival
-        told = "not reached" if rate_ is None else f"{off:8.1e} m {rate_:10.1f} {mine / rate_:9.0f}"
+        told = "not reached" if rate_ is None else f"{off:12.1e} m {rate_:10.1f} {mine / rate_:9.0f}"
         lines.append(f"{name:34} {told}")
     if not others:
         text = "\n".join(lines) + "\n"

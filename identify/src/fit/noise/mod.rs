@@ -91,6 +91,8 @@ pub(super) struct Spread {
     shift: DVector<f64>,
     /// Mean covariance, with the square of the shift.
     pub covariance: DMatrix<f64>,
+    /// Probability that no noise is slow.
+    pub white: f64,
     /// The most likely slow noises.
     pub slow: Vec<Slow>,
     /// Errors that repeat with position.
@@ -100,6 +102,11 @@ pub(super) struct Spread {
 }
 
 impl Spread {
+    /// True if the residuals make white noise less probable than it was beforehand, or repeat with position.
+    pub fn is_coloured(&self) -> bool {
+        self.white < WHITE_BEFOREHAND || !self.waves.is_empty()
+    }
+
     /// Half-width of the 95 % interval of Σ c_j δ_j: exceeded with 5 % over the mixture of all kinds of noise,
     /// including the shift.
     pub fn half_width(&self, combination: &DVector<f64>) -> f64 {
@@ -226,6 +233,7 @@ impl Estimate {
         told.retain(|one| one.weight > top - 12.0);
         told.sort_by(|a, b| b.weight.total_cmp(&a.weight));
         let total: f64 = told.iter().map(|one| (one.weight - top).exp()).sum();
+        let white = told.iter().filter(|one| one.slow.is_empty()).map(|one| (one.weight - top).exp() / total).sum();
         let of = |scales: Option<&Vec<Vec<f64>>>| self.parts(&told, scales.map(Vec::as_slice), rest, &unsure);
         let (even, uneven) = (of(None), scales.as_ref().map(|scales| of(Some(scales))));
         let mut covariance = &shift * shift.transpose();
@@ -237,7 +245,7 @@ impl Estimate {
             parts.push((weight, own, uneven.next()));
         }
         parts.retain(|(weight, ..)| *weight > 1e-5);
-        Some(Spread { parts, freedom, shift, covariance, slow, waves, unevenness })
+        Some(Spread { parts, freedom, shift, covariance, white, slow, waves, unevenness })
     }
 
     /// Covariances of the globals by these kinds of noise, with these sizes along the series.
@@ -672,6 +680,7 @@ mod tests {
             freedom: 1e6,
             shift: DVector::from_element(1, shift),
             covariance: square,
+            white: 1.0,
             slow: Vec::new(),
             waves: Vec::new(),
             unevenness: 1.0,
@@ -737,6 +746,22 @@ mod tests {
                     assert!((0.3..4.0).contains(&most), "{truth:?}: {lost:?}");
                 }
             }
+        }
+    }
+
+    /// White noise is rarely taken for slow, and noise of a time constant from 3 to 60 samples always, however small a
+    /// part of the power it has.
+    #[test]
+    fn slow_noise_is_told_from_white() {
+        let coloured = |seed: u64, slow: &[Slow]| {
+            let estimate = Estimate { quantity: Quantity::CartSpeed, ..noise(drawn(seed, 700, slow)) };
+            estimate.spread(&DMatrix::zeros(0, 0)).unwrap().is_coloured()
+        };
+        let taken = (0..40).filter(|seed| coloured(*seed, &[])).count();
+        assert!(taken <= 4, "{taken} of 40");
+        for (seed, time) in [3e-3, 1e-2, 6e-2].into_iter().enumerate() {
+            let slow = Slow { variance: 0.5, time, frequency: 0.0 };
+            assert!(coloured(seed as u64, &[slow]), "{time}");
         }
     }
 

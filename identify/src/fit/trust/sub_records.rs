@@ -16,7 +16,7 @@ use super::uncertainty::Judged;
 use crate::case::{Case, Plan};
 use crate::fit::asked::problem::Problem;
 use crate::fit::asked::run::FittedLog;
-use crate::fit::limits::{COLOURED, FEWEST_WINDOWS, REFIT_TOLERANCE, WINDOW_SAMPLES, WINDOWS_OFF};
+use crate::fit::limits::{FEWEST_WINDOWS, REFIT_TOLERANCE, WINDOW_SAMPLES, WINDOWS_OFF};
 use crate::fit::noise::student::student;
 use crate::fit::search::least_squares::minimise;
 use crate::fit::search::point::{Ending, Minimum, Options};
@@ -30,7 +30,7 @@ use nalgebra::{DMatrix, DVector};
 pub(crate) fn disagreement(case: &Case, plan: &Plan, found: &Searched, judged: &Judged) -> Option<Disagreement> {
     let whole = &found.problem;
     let g = whole.globals();
-    let skipped = plan.windows.is_some() || plan.closed_loop || plan.until.is_some() || judged.inflation < COLOURED;
+    let skipped = plan.windows.is_some() || plan.closed_loop || plan.until.is_some() || !judged.is_coloured();
     // A window without a turn contains no information on the play of a sensor.
     let skipped = skipped || plan.nuisance.sensor_play.is_some();
     if skipped || whole.is_stopped() || !judged.identifiability.complete() || found.best.at_bound[..g].contains(&true) {

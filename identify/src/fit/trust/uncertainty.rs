@@ -7,7 +7,7 @@ use super::directions::Directions;
 use super::doubts::{Cause, Disagreement, OtherLaw};
 use super::identify::Identifiability;
 use crate::fit::asked::problem::Problem;
-use crate::fit::limits::NORMAL;
+use crate::fit::limits::{COLOURED, NORMAL};
 use crate::fit::noise::{self, Slow, Spread, Wave, half_width};
 use crate::fit::search::triangle::inverse_of_square;
 use crate::log::Quantity;
@@ -49,6 +49,12 @@ pub(crate) struct Judged {
 }
 
 impl Judged {
+    /// True if residuals may hide another model: they are more probably slow than one would think beforehand, and that
+    /// widens the errors.
+    pub fn is_coloured(&self) -> bool {
+        self.inflation >= COLOURED && self.spreads.iter().any(Spread::is_coloured)
+    }
+
     /// The uncertainty at `x` with these residuals and this Jacobian, without the `held` variables; `None` if numbers
     /// fail.
     pub fn new(

@@ -36,7 +36,7 @@ use super::uncertainty::Judged;
 use crate::case::{Case, Plan};
 use crate::fit::asked::run::FittedLog;
 use crate::fit::limits::{
-    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_RIVAL, CAUSES_FITTED, CAUSES_STEPPED, COLOURED,
+    CAUSE_ERRORS, CAUSE_EXPLAINS, CAUSE_MOST_VALUES, CAUSE_NEAR, CAUSE_RIVAL, CAUSES_FITTED, CAUSES_STEPPED,
     HELD_OUT_SHOWS, NORMAL, SAME_MINIMUM, STARTS_FITTED,
 };
 use crate::fit::search::starts::{Effort, Searched, is_noise};
@@ -199,7 +199,7 @@ pub(crate) fn is_asked(case: &Case, plan: &Plan, found: &Searched, judged: &Judg
     let problem = &found.problem;
     // Noise of a narrow band, such as the swing of a belt, may determine parameters as well as white noise does.
     let is_astray = || !case.machine.has_one_coordinate() && !is_noise(problem, &found.best);
-    (judged.inflation >= COLOURED || is_astray())
+    (judged.is_coloured() || is_astray())
         && case.machine.stepper().is_none()
         && plan.windows.is_none()
         && plan.until.is_none()

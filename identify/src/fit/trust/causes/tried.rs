@@ -8,7 +8,7 @@ use crate::fit::asked::residuals::Residuals;
 use crate::fit::asked::run::{Extra, Nuisance};
 use crate::fit::limits::{
     CAUSE_ALIKE, CAUSE_DIFFERENCE, CAUSE_EXPLAINS, CAUSE_MOST_STEPS, CAUSE_REACH, CAUSE_SLOW, CAUSE_SLOW_STEPS,
-    CAUSE_STEPS, COLOURED, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS,
+    CAUSE_STEPS, ROUGH_TOLERANCE, TRIAL_FIT_ITERATIONS,
 };
 use crate::fit::search::least_squares::{minimise, resume};
 use crate::fit::search::point::{Ending, Minimum, Options};
@@ -225,7 +225,7 @@ impl<'a> Tried<'a> {
 
     /// True if its residuals are noise: no larger than that of the logs, or white.
     pub fn leaves_noise(&self) -> bool {
-        self.is_noise() || self.judged().is_some_and(|judged| judged.inflation < COLOURED)
+        self.is_noise() || self.judged().is_some_and(|judged| !judged.is_coloured())
     }
 
     /// The machine with the element.
