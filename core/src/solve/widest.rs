@@ -9,6 +9,8 @@
 /// #[inline(always)]
 /// fn sum_by_any(values: &[f64]) -> f64 { … }
 /// ```
+#[doc(hidden)]
+#[macro_export]
 macro_rules! widest {
     // A method that reads.
     ($(#[$meta:meta])* $vis:vis fn $name:ident(&self $(, $arg:ident: $type:ty)*) $(-> $out:ty)?

@@ -31,6 +31,7 @@ use crate::fit::limits::{
     WHITE_BEFOREHAND,
 };
 use crate::log::Quantity;
+use filter::BESIDE;
 use nalgebra::{DMatrix, DVector};
 use series::Series;
 use std::f64::consts::TAU;
@@ -200,6 +201,71 @@ pub(super) fn spreads(
     estimates.into_iter().filter_map(|estimate| estimate.spread(&rest)).collect()
 }
 
+impl Normal {
+    /// Adds a series, with these products and logarithms of its innovations.
+    fn add(&mut self, series: &Series, globals: usize, (mut m, logs): (Vec<f64>, f64)) {
+        self.determinant += logs;
+        self.count += series.time.len();
+        let wide = series.wide();
+        for k in 0..series.own {
+            let pivot = m[k * wide + k];
+            if pivot <= 1e-300 {
+                continue;
+            }
+            self.own += 1;
+            self.determinant += pivot.ln();
+            for i in k + 1..wide {
+                let factor = m[k * wide + i] / pivot;
+                for j in i..wide {
+                    m[i * wide + j] -= factor * m[k * wide + j];
+                }
+            }
+        }
+        let place = |c: usize| series.moved.get(c).copied().unwrap_or_else(|| globals + c - series.moved.len());
+        for i in series.own..wide {
+            for j in i..wide {
+                let (a, b) = (place(i), place(j));
+                self.sum[(a, b)] += m[i * wide + j];
+                if a != b {
+                    self.sum[(b, a)] += m[i * wide + j];
+                }
+            }
+        }
+    }
+
+    /// The restricted likelihood of the residuals with these slow noises.
+    fn likelihood(self, slow: Vec<Slow>) -> Option<NoiseAtPoint> {
+        let Normal { mut sum, mut determinant, count, own } = self;
+        let n = sum.ncols() - 1;
+        let mut rank = 0;
+        for k in 0..n {
+            let pivot = sum[(k, k)];
+            if pivot <= 1e-300 {
+                continue;
+            }
+            rank += 1;
+            determinant += pivot.ln();
+            for i in k + 1..=n {
+                let factor = sum[(k, i)] / pivot;
+                for j in i..=n {
+                    sum[(i, j)] -= factor * sum[(k, j)];
+                }
+            }
+        }
+        let freedom = count as f64 - (rank + own) as f64;
+        let squares = sum[(n, n)];
+        if freedom < 2.0 || squares <= 0.0 || !squares.is_finite() || !determinant.is_finite() {
+            return None;
+        }
+        Some(NoiseAtPoint {
+            weight: -0.5 * determinant - 0.5 * freedom * squares.ln(),
+            white: squares / freedom,
+            slow,
+            freedom,
+        })
+    }
+}
+
 /// The noise of one quantity.
 struct Estimate {
     quantity: Quantity,
@@ -298,10 +364,12 @@ impl Estimate {
             for &time in times.iter().filter(apart) {
                 let mut falling = 0;
                 let mut before = f64::NEG_INFINITY;
-                for &power in &powers {
-                    let slow = Slow { variance: variance(power, time), time, frequency: 0.0 };
-                    let both: Vec<Slow> = std::iter::once(slow).chain(beside).collect();
-                    let Some(one) = self.likelihood(&both) else { continue };
+                let of = |power: &f64| {
+                    let slow = Slow { variance: variance(*power, time), time, frequency: 0.0 };
+                    std::iter::once(slow).chain(beside).collect()
+                };
+                let tried = powers.chunks(BESIDE).flat_map(|powers| self.likelihoods(powers.iter().map(of).collect()));
+                for one in tried.flatten() {
                     falling = if one.weight < before { falling + 1 } else { 0 };
                     before = one.weight;
                     told.push(one);
@@ -317,7 +385,7 @@ impl Estimate {
             told.iter_mut().for_each(|one| one.weight += before.ln());
             told
         };
-        let mut all = counted(self.likelihood(&[]).into_iter().collect(), WHITE_BEFOREHAND);
+        let mut all = counted(self.likelihoods(vec![Vec::new()]).into_iter().flatten().collect(), WHITE_BEFOREHAND);
         let one = along(None);
         let first = best(&one).map(|one| one.slow[0]);
         all.extend(counted(one, (1.0 - WHITE_BEFOREHAND - TWO_BEFOREHAND) / (times.len() * powers.len()) as f64));
@@ -351,9 +419,12 @@ impl Estimate {
     /// a pure tone. Its variance is that of its amplitude only where its own noise, σ² 2T/τ in a log of length T, is
     /// below the error with which the log determines it.
     fn swinging(&self, [interval, longest]: [f64; 2], gain: f64) -> Vec<NoiseAtPoint> {
-        let of = |[frequency, time, variance]: [f64; 3]| {
-            let [frequency, time, variance] = [frequency.exp(), time.exp(), variance.exp()];
-            self.likelihood(&[Slow { variance, time, frequency }])
+        let of = |all: &[[f64; 3]]| {
+            let kind = |at: &[f64; 3]| {
+                let [frequency, time, variance] = at.map(f64::exp);
+                vec![Slow { variance, time, frequency }]
+            };
+            self.likelihoods(all.iter().map(kind).collect())
         };
         // Mean square of the blocks, of which noise makes no more than a part by chance.
         let rows = self.series.iter().flat_map(|series| series.rows.chunks(series.wide()));
@@ -363,20 +434,19 @@ impl Estimate {
         let weight = |told: &Option<NoiseAtPoint>| {
             told.as_ref().filter(is_possible).map_or(f64::NEG_INFINITY, |told| told.weight)
         };
-        let mut best: Option<([f64; 3], f64)> = None;
         let slowest = SWINGS_IN_LOG * TAU / longest;
-        let (mut frequency, mut tried) = (slowest, 0);
+        let (mut frequency, mut tried) = (slowest, Vec::new());
         while frequency * interval < SWING_FASTEST {
-            for power in SWING_POWERS {
-                let time = 1.0 / (SWING_DAMPING * frequency);
-                let at = [frequency, time, power / gain].map(f64::ln);
-                let own = weight(&of(at));
-                tried += 1;
-                if best.is_none_or(|(_, most)| own > most) {
-                    best = Some((at, own));
-                }
-            }
+            let time = 1.0 / (SWING_DAMPING * frequency);
+            tried.extend(SWING_POWERS.map(|power| [frequency, time, power / gain].map(f64::ln)));
             frequency *= SWING_RATIO;
+        }
+        let mut best: Option<([f64; 3], f64)> = None;
+        for (at, told) in tried.iter().zip(of(&tried)) {
+            let own = weight(&told);
+            if best.is_none_or(|(_, most)| own > most) {
+                best = Some((*at, own));
+            }
         }
         let Some((mut at, mut most)) = best else { return Vec::new() };
         let longest_time = (SWING_LONGEST * longest).ln();
@@ -385,8 +455,9 @@ impl Estimate {
             for ((step, first), way) in steps.iter_mut().zip(SWING_STEPS).zip(SWING_WAYS) {
                 let near = [*step, -*step].map(|step| std::array::from_fn(|j| at[j] + step * way[j]));
                 let is_swing = |next: &[f64; 3]| next[0] >= slowest.ln() && next[1] <= longest_time;
-                let near = near.into_iter().filter(is_swing);
-                let better = near.map(|next| (next, weight(&of(next)))).find(|(_, own)| *own > most);
+                let near: Vec<[f64; 3]> = near.into_iter().filter(is_swing).collect();
+                let told = near.iter().zip(of(&near)).map(|(next, told)| (*next, weight(&told)));
+                let better = told.into_iter().find(|(_, own)| *own > most);
                 match better {
                     Some(next) => ((at, most), *step) = (next, first.min(*step / SWING_SHRINKS)),
                     None => *step *= SWING_SHRINKS,
@@ -401,93 +472,42 @@ impl Estimate {
         // The width of its peak is 1/τ, and at least that of a line in the log.
         let width = 1.0 / (at[0].exp() * at[1].exp().min(longest));
         let apart = [width.min(SWING_AROUND[0]), SWING_AROUND[1], SWING_AROUND[2]];
-        let mut all = Vec::new();
-        for i in shares {
-            for j in shares {
-                for k in shares {
-                    all.extend(of([at[0] + i * apart[0], at[1] + j * apart[1], at[2] + k * apart[2]]));
-                }
-            }
-        }
-        let before = (SWING_BEFOREHAND / tried.max(1) as f64 / all.len().max(1) as f64).ln();
+        let places = shares.into_iter().flat_map(|i| shares.map(|j| (i, j)));
+        let around = places
+            .flat_map(|(i, j)| shares.map(|k| [at[0] + i * apart[0], at[1] + j * apart[1], at[2] + k * apart[2]]));
+        let mut all: Vec<NoiseAtPoint> = of(&around.collect::<Vec<_>>()).into_iter().flatten().collect();
+        let before = (SWING_BEFOREHAND / tried.len().max(1) as f64 / all.len().max(1) as f64).ln();
         all.iter_mut().for_each(|one| one.weight += before);
         all
     }
 
-    /// The restricted likelihood of the residuals with these slow noises.
-    fn likelihood(&self, slow: &[Slow]) -> Option<NoiseAtPoint> {
-        let Normal { mut sum, mut determinant, count, own } = self.normal(slow);
-        let n = sum.ncols() - 1;
-        let mut rank = 0;
-        for k in 0..n {
-            let pivot = sum[(k, k)];
-            if pivot <= 1e-300 {
-                continue;
-            }
-            rank += 1;
-            determinant += pivot.ln();
-            for i in k + 1..=n {
-                let factor = sum[(k, i)] / pivot;
-                for j in i..=n {
-                    sum[(i, j)] -= factor * sum[(k, j)];
-                }
-            }
-        }
-        let freedom = count as f64 - (rank + own) as f64;
-        let squares = sum[(n, n)];
-        if freedom < 2.0 || squares <= 0.0 || !squares.is_finite() || !determinant.is_finite() {
-            return None;
-        }
-        Some(NoiseAtPoint {
-            weight: -0.5 * determinant - 0.5 * freedom * squares.ln(),
-            white: squares / freedom,
-            slow: slow.to_vec(),
-            freedom,
-        })
+    /// The restricted likelihoods of the residuals with each of these slow noises, all of equally many and of one kind.
+    fn likelihoods(&self, kinds: Vec<Vec<Slow>>) -> Vec<Option<NoiseAtPoint>> {
+        let all = kinds.chunks(BESIDE).flat_map(|kinds| {
+            let slow: Vec<&[Slow]> = kinds.iter().map(Vec::as_slice).collect();
+            self.normals(&slow)
+        });
+        let normals: Vec<Normal> = all.collect();
+        normals.into_iter().zip(kinds).map(|(normal, slow)| normal.likelihood(slow)).collect()
     }
 
-    /// Normal equations of the globals, the waves and the residuals under these slow noises, with the columns of single
-    /// runs eliminated.
-    fn normal(&self, slow: &[Slow]) -> Normal {
+    /// Normal equations of the globals, the waves and the residuals under each of these slow noises, with the columns of
+    /// single runs eliminated.
+    fn normals(&self, kinds: &[&[Slow]]) -> Vec<Normal> {
         let g = self.globals;
         let n = g + self.series.first().map_or(0, |series| series.more);
-        let mut normal = Normal { sum: DMatrix::zeros(n + 1, n + 1), determinant: 0.0, count: 0, own: 0 };
+        let none = || Normal { sum: DMatrix::zeros(n + 1, n + 1), determinant: 0.0, count: 0, own: 0 };
+        let mut normals: Vec<Normal> = kinds.iter().map(|_| none()).collect();
         for series in &self.series {
-            let (mut m, logs) = filter::filter(series, slow);
-            normal.determinant += logs;
-            normal.count += series.time.len();
-            let wide = series.wide();
-            for k in 0..series.own {
-                let pivot = m[k * wide + k];
-                if pivot <= 1e-300 {
-                    continue;
-                }
-                normal.own += 1;
-                normal.determinant += pivot.ln();
-                for i in k + 1..wide {
-                    let factor = m[k * wide + i] / pivot;
-                    for j in i..wide {
-                        m[i * wide + j] -= factor * m[k * wide + j];
-                    }
-                }
-            }
-            let place = |c: usize| series.moved.get(c).copied().unwrap_or_else(|| g + c - series.moved.len());
-            for i in series.own..wide {
-                for j in i..wide {
-                    let (a, b) = (place(i), place(j));
-                    normal.sum[(a, b)] += m[i * wide + j];
-                    if a != b {
-                        normal.sum[(b, a)] += m[i * wide + j];
-                    }
-                }
-            }
+            let filtered = filter::filter(series, kinds);
+            normals.iter_mut().zip(filtered).for_each(|(normal, own)| normal.add(series, g, own));
         }
-        normal
+        normals
     }
 
     /// The amplitudes of the waves in the rows under this noise, and their covariance.
     fn amplitudes(&self, noise: &NoiseAtPoint) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let sum = self.normal(&noise.slow).sum;
+        let sum = self.normals(&[&noise.slow]).remove(0).sum;
         let n = sum.ncols() - 1;
         let inverse = sum.view((0, 0), (n, n)).into_owned().try_inverse()?;
         let (waves, more) = (self.globals, n - self.globals);
@@ -737,7 +757,7 @@ mod tests {
                 let estimate = noise(drawn(seed as u64, 700, &[truth]));
                 let all = estimate.swinging([1e-3, 0.7], 1.0);
                 let found = best(&all).unwrap().slow[0];
-                let likely = |slow: Slow| estimate.likelihood(&[slow]).unwrap().weight;
+                let likely = |slow: Slow| estimate.likelihoods(vec![vec![slow]]).remove(0).unwrap().weight;
                 assert!(likely(found) > likely(truth) - 0.5, "{truth:?}: {found:?}");
                 // What is averaged over stands about a standard error around the best, of its time and of its variance.
                 if (damping, variance) == (0.02, 2.0) {

@@ -8,7 +8,7 @@
 //! Wave numbers κ from two waves in the travel to one in two blocks are tried.
 
 use super::Slow;
-use super::filter::innovations;
+use super::filter::{Numbers, innovations};
 use super::series::Series;
 use crate::fit::limits::{BOTH_WAYS, FEWEST_WAVES, MOST_WAVE_NUMBERS, WAVE_CLEAR, WAVE_HALVINGS, WAVE_STEP};
 use std::f64::consts::TAU;
@@ -76,8 +76,8 @@ fn gain(all: &[Series], amplitudes: &[f64], slow: &[Slow], kappa: f64) -> (f64, 
             |row: &[f64]| row[wide - 1] - row[before..wide - 1].iter().zip(amplitudes).map(|(c, a)| c * a).sum::<f64>();
         let own = series.rows.chunks(wide).enumerate();
         let rows: Vec<f64> = own.flat_map(|(k, row)| [waves[0][k], waves[1][k], left(row)]).collect();
-        innovations(series, &rows, 3, slow, |v, f| {
-            let [c, s, r] = [v[0], v[1], v[2]];
+        innovations(series, &rows, 3, &[slow], |v: &[Numbers<1>], f: f64| {
+            let [c, s, r] = [v[0].0[0], v[1].0[0], v[2].0[0]];
             for (sum, product) in sums.iter_mut().zip([c * c, c * s, s * s, c * r, s * r]) {
                 *sum += product / f;
             }

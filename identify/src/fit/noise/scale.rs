@@ -13,7 +13,7 @@
 //! improve the accuracy of a parameter that is determined at rest.
 
 use super::Slow;
-use super::filter::innovations;
+use super::filter::{Numbers, innovations};
 use super::series::Series;
 use crate::fit::limits::{BLOCK_AT_REST, CLASSES_CLEAR, FEWEST_BLOCKS, LEAST_SIZE, SPEED_CLASSES};
 
@@ -23,7 +23,8 @@ pub(super) fn scales(all: &[Series], slow: &[Slow]) -> Option<Vec<Vec<f64>>> {
     for series in all {
         let wide = series.wide();
         let residuals: Vec<f64> = series.rows.chunks(wide).map(|row| row[wide - 1]).collect();
-        innovations(series, &residuals, 1, slow, |v, f| squares.push(v[0] * v[0] / f));
+        let take = |v: &[Numbers<1>], f: f64| squares.push(v[0].0[0] * v[0].0[0] / f);
+        innovations(series, &residuals, 1, &[slow], take);
     }
     let n = squares.len() as f64;
     let mean = squares.iter().sum::<f64>() / n;
