@@ -323,6 +323,11 @@ pub(crate) const ROUNDED: f64 = 0.5;
 /// Unit: 1. Source: below are the last digits of logs and solvers. Test: `last_digits_of_a_log_speak_for_no_law`.
 pub(crate) const NOTHING: f64 = 1e-6;
 
+/// Kinds of noise that are filtered side by side.
+///
+/// Unit: kinds. Source: speed: two vectors of AVX2. Test: `a_filter_agrees_with_the_covariance_of_its_noise`.
+pub(crate) const BESIDE: usize = 8;
+
 /// Maximum number of blocks into which the values of a quantity are averaged.
 ///
 /// Unit: blocks. Source: speed. Test: `a_long_log_has_a_bounded_number_of_blocks`.

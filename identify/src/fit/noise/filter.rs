@@ -7,11 +7,8 @@
 
 use super::Slow;
 use super::series::Series;
-use crate::fit::limits::SLOW_NOISES;
+use crate::fit::limits::{BESIDE, SLOW_NOISES};
 use taut_core::widest;
-
-/// Kinds of noise that are filtered side by side.
-pub(super) const BESIDE: usize = 8;
 
 /// For each of these kinds of noise, at most [`BESIDE`] of equally many states: products Σ v vᵀ/F of the innovations of
 /// all columns, upper half, and Σ ln F.
