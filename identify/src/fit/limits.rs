@@ -506,6 +506,11 @@ pub(crate) const WINDOW_SAMPLES: f64 = 100.0;
 /// Unit: 1. Source: chosen. Test: `elements_are_looked_for_where_slow_noise_widens_the_errors`.
 pub(crate) const COLOURED: f64 = 1.1;
 
+/// Probability of white noise below which residuals count as coloured.
+///
+/// Unit: 1. Source: chosen: white noise of 700 rows has at least 0.6. Test: `slow_noise_is_told_from_white`.
+pub(crate) const WHITE_LIKELY: f64 = 0.5;
+
 /// Deviation of the windows from the whole logs, and from each other, above which they disagree.
 ///
 /// Unit: standard errors. Source: chosen: 2 % of normal deviates. Test: `limits_of_normal_deviates_are_theirs`.

@@ -49,8 +49,7 @@ pub(crate) struct Judged {
 }
 
 impl Judged {
-    /// True if residuals may hide another model: they are more probably slow than one would think beforehand, and that
-    /// widens the errors.
+    /// True if residuals may hide another model: slow noise is more probable than white, and widens the errors.
     pub fn is_coloured(&self) -> bool {
         self.inflation >= COLOURED && self.spreads.iter().any(Spread::is_coloured)
     }
