@@ -197,6 +197,21 @@ pub(super) struct Law<const N: usize, const S: usize, const D: usize> {
     pub(super) is_still: bool,
 }
 
+/// What a law keeps its rows in.
+pub(super) struct Room<const S: usize, const D: usize> {
+    fixed: Vec<(u8, u8, f64)>,
+    energy: Vec<Moving<f64, S, D>>,
+    bounds: Vec<Bound<S, D>>,
+    weights: Vec<Moving<f64, S, D>>,
+}
+
+impl<const S: usize, const D: usize> Room<S, D> {
+    pub(super) fn new() -> Self {
+        let (fixed, energy) = (Vec::with_capacity(8), Vec::with_capacity(S + D + 3));
+        Self { fixed, energy, bounds: Vec::with_capacity(8), weights: Vec::with_capacity(8) }
+    }
+}
+
 /// Slots of guards by the numbers of their parts.
 pub(super) type Slots = Vec<u16>;
 
@@ -218,10 +233,17 @@ fn part(cause: Cause) -> u16 {
 }
 
 impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
-    pub(super) fn new(core: &Core<N>, readings: Arc<Readings<S, D>>, plan: &Plan<N>, slots: &mut Slots) -> Self {
+    pub(super) fn new(
+        core: &Core<N>,
+        readings: Arc<Readings<S, D>>,
+        plan: &Plan<N>,
+        slots: &mut Slots,
+        room: Room<S, D>,
+    ) -> Self {
+        let Room { mut fixed, mut energy, mut bounds, mut weights } = room;
         let matrices = Arc::clone(&core.matrices);
         let matrix = matrices.rates();
-        let (mut rates, mut fixed) = (Rates::all(0.0), Vec::with_capacity(8));
+        let mut rates = Rates::all(0.0);
         let mut put_fixed = |number: usize, row: usize| {
             for &place in plan.fixed.iter().filter(|place| matrix.at(row, **place) != 0.0) {
                 fixed.push((number as u8, place as u8, matrix.at(row, place)));
@@ -235,8 +257,6 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
             rates.d[i].0 = plan.moving::<S, D>(|place| matrix.at(row, place)).s;
             put_fixed(S + i, row);
         }
-        let mut bounds: Vec<Bound<S, D>> = Vec::with_capacity(matrices.guards.len());
-        let mut weights = Vec::with_capacity(matrices.guards.len());
         for (index, guard) in matrices.guards.iter().enumerate() {
             let mut row = [0.0; N];
             guard.row.terms().for_each(|(place, weight)| row[place] = weight);
@@ -261,11 +281,20 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
         let (mechanism, layout) = (&core.common.mechanism, &core.common.space.layout);
         let longest = REACH / matrices.norm(mechanism, layout);
         let grow = matrices.growth_over(longest.min(1.0));
-        let mut energy = Vec::with_capacity(S + D + 3);
         energy.extend(matrices.energy_forms().map(|form| plan.moving(|place| form[place])));
         let bodies = mechanism.bodies.len();
         let is_still = matrices.mode.motion[..bodies].iter().all(|motion| *motion == Motion::Stuck);
         Self { longest, grow, rates, fixed, energy, bounds, weights, readings, is_still, matrices }
+    }
+
+    /// Its room, for another one.
+    pub(super) fn room(self) -> Room<S, D> {
+        let Self { mut fixed, mut energy, mut bounds, mut weights, .. } = self;
+        fixed.clear();
+        energy.clear();
+        bounds.clear();
+        weights.clear();
+        Room { fixed, energy, bounds, weights }
     }
 
     /// The rates while what is constant has the values in z.
@@ -299,6 +328,11 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
             let form = Form { of: bound.of, constant };
             (bound.slot, Guard { form, top, dual: bound.dual, fresh: fresh(bound.low) as f64 })
         })
+    }
+
+    /// True if it has a guard in this slot.
+    pub(super) fn has(&self, slot: usize) -> bool {
+        self.bounds.iter().any(|bound| bound.slot == slot)
     }
 
     /// The guards for which these are true, by their slots: the form itself, and its upper bound.

@@ -40,7 +40,7 @@ use crate::solve::polynomial::Polynomial;
 use crate::solve::propagator::SERIES_TERMS;
 use crate::solve::{Ending, Grid, Outcome, check, roots};
 use flight::{Flight, Moving, Width, numbers};
-use law::{Law, Parts, Plan, ReadingSlot, Readings, Slots, all_slide, reads_alike};
+use law::{Law, Parts, Plan, ReadingSlot, Readings, Room, Slots, all_slide, reads_alike};
 use part::{INNER, Part, TERMS};
 use peak::{Later, Start};
 use std::cell::RefCell;
@@ -195,8 +195,9 @@ struct Fleet<'a, 'j, const N: usize, const S: usize, const D: usize> {
     /// Times within the piece between which a lane's last quantity is followed, s.
     watched: [(f64, f64); LANES],
     columns: Columns<S, D>,
-    /// Room of runs that have ended.
+    /// Room of runs that have ended, and of laws of machines that have.
     spare: Vec<(Vec<Start<S, D>>, Vec<Later>)>,
+    rooms: Vec<Room<S, D>>,
 }
 
 /// The series of one lane.
@@ -219,6 +220,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             watched: [(f64::INFINITY, 0.0); LANES],
             columns: [Moving::all(0.0); TERMS],
             spare: Vec::with_capacity(LANES),
+            rooms: Vec::new(),
         };
         (0..LANES).for_each(|lane| fleet.load(lane));
         while fleet.seats.iter().any(Option::is_some) {
@@ -281,7 +283,10 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
 
     /// Begins the next run of a machine; false if there is none, or none for lanes.
     fn begin(&mut self, lane: usize, mut kept: Kept<N, S, D>, mut next: Vec<RunOf<'a>>) -> bool {
-        let Some((experiment, watcher)) = next.pop() else { return false };
+        let Some((experiment, watcher)) = next.pop() else {
+            self.rooms.extend(kept.laws.into_iter().map(Law::room));
+            return false;
+        };
         let start = experiment.start(&kept.mechanism);
         let grid = Grid::new(start.every, start.until);
         let seen = kept.mechanism.seen_by(&kept.space.layout, &start.state);
@@ -412,7 +417,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
     /// Sets the numbers of the present mode in a lane; false if a quantity is bounded by no spring of it.
     #[inline(never)]
     fn take_up(&mut self, lane: usize) -> bool {
-        let Self { seats, plan, slots, flight, .. } = self;
+        let Self { seats, plan, slots, flight, rooms, .. } = self;
         let Some(seat) = &mut seats[lane] else { return true };
         let Seat { core, kept, watcher, law: present, reads, .. } = &mut **seat;
         let laws = &mut kept.laws;
@@ -428,7 +433,8 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
                         Arc::new(own)
                     }
                 };
-                laws.push(Law::new(core, readings, plan, slots));
+                let room = rooms.pop().unwrap_or_else(Room::new);
+                laws.push(Law::new(core, readings, plan, slots, room));
                 laws.len() - 1
             }
         };
@@ -449,7 +455,8 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             *present = Some(number);
         }
         flight.make_room(slots.len(), 0, 0);
-        flight.guards.iter_mut().for_each(|guard| guard.clear(lane));
+        let others = flight.guards.iter_mut().enumerate().filter(|(slot, _)| !law.has(*slot));
+        others.for_each(|(_, guard)| guard.clear(lane));
         for (slot, guard) in law.guards(core, plan) {
             flight.is_fresh |= guard.fresh > 0.0;
             flight.guards[slot].put(lane, &guard);
