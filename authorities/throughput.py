@@ -25,7 +25,8 @@ The error is the largest distance of drive pulley, cart and idler positions at a
 the nominal machine at 5 V; taut's own is in speed.py's output. SciPy and CVODE have the loosest tolerance whose error
 is below 1e-6 m. A fixed step meets the stops of one machine better or worse than those of another, so that C in lanes
 is also run with the fewest steps for which the cart of 95 % of 1000 simulations of drawn machines, and of all of them,
-ends within 4e-7 m of where it does for `taut sweep`, whose rows are within 1e-12 m of the exact solver's. Rates are those of wall time, a few seconds each, and vary with what else the computer does.
+ends within 4e-7 m of where it does for `taut sweep`, whose rows are within 1e-12 m of the exact solver's. Rates are
+those of wall time, a few seconds each, and vary with what else the computer does.
 """
 
 from __future__ import annotations
@@ -213,6 +214,8 @@ def by_lanes(truth, folder):
             if met:
                 wanted = [goal for goal in wanted if goal not in met]
                 found.append((f"C, {lanes} lanes, {steps} steps a ms", errors, program, steps))
+            if not wanted:
+                break
     return found
 
 

@@ -768,8 +768,8 @@ mod tests {
         }
     }
 
-    /// White noise is rarely taken for slow, and noise of a time constant from 3 to 60 samples always, however small a
-    /// part of the power it has.
+    /// White noise is rarely taken for slow, and noise of half its variance and of a time constant from 3 to 60 samples
+    /// always counts.
     #[test]
     fn slow_noise_is_told_from_white() {
         let coloured = |seed: u64, slow: &[Slow]| {

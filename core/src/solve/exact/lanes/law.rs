@@ -187,28 +187,29 @@ pub(super) struct Law<const N: usize, const S: usize, const D: usize> {
     pub(super) longest: f64,
     pub(super) grow: f64,
     rates: Rates<f64, S, D>,
-    /// Constant parts of the rates: number of the rate, place, weight.
-    fixed: Vec<(u8, u8, f64)>,
-    pub(super) energy: Vec<Moving<f64, S, D>>,
-    bounds: Vec<Bound<S, D>>,
-    /// By the numbers of guards.
-    weights: Vec<Moving<f64, S, D>>,
+    rows: Rows<S, D>,
     pub(super) readings: Arc<Readings<S, D>>,
     pub(super) is_still: bool,
 }
 
-/// What a law keeps its rows in.
-pub(super) struct Room<const S: usize, const D: usize> {
+/// The rows of a law, whose room serves another one after it.
+#[derive(Default)]
+pub(super) struct Rows<const S: usize, const D: usize> {
+    /// Constant parts of the rates: number of the rate, place, weight.
     fixed: Vec<(u8, u8, f64)>,
     energy: Vec<Moving<f64, S, D>>,
     bounds: Vec<Bound<S, D>>,
+    /// By the numbers of guards.
     weights: Vec<Moving<f64, S, D>>,
 }
 
-impl<const S: usize, const D: usize> Room<S, D> {
-    pub(super) fn new() -> Self {
-        let (fixed, energy) = (Vec::with_capacity(8), Vec::with_capacity(S + D + 3));
-        Self { fixed, energy, bounds: Vec::with_capacity(8), weights: Vec::with_capacity(8) }
+impl<const S: usize, const D: usize> Rows<S, D> {
+    fn clear(&mut self) {
+        let Self { fixed, energy, bounds, weights } = self;
+        fixed.clear();
+        energy.clear();
+        bounds.clear();
+        weights.clear();
     }
 }
 
@@ -238,9 +239,10 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
         readings: Arc<Readings<S, D>>,
         plan: &Plan<N>,
         slots: &mut Slots,
-        room: Room<S, D>,
+        mut rows: Rows<S, D>,
     ) -> Self {
-        let Room { mut fixed, mut energy, mut bounds, mut weights } = room;
+        rows.clear();
+        let Rows { fixed, energy, bounds, weights } = &mut rows;
         let matrices = Arc::clone(&core.matrices);
         let matrix = matrices.rates();
         let mut rates = Rates::all(0.0);
@@ -284,23 +286,23 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
         energy.extend(matrices.energy_forms().map(|form| plan.moving(|place| form[place])));
         let bodies = mechanism.bodies.len();
         let is_still = matrices.mode.motion[..bodies].iter().all(|motion| *motion == Motion::Stuck);
-        Self { longest, grow, rates, fixed, energy, bounds, weights, readings, is_still, matrices }
+        Self { longest, grow, rates, rows, readings, is_still, matrices }
     }
 
-    /// Its room, for another one.
-    pub(super) fn room(self) -> Room<S, D> {
-        let Self { mut fixed, mut energy, mut bounds, mut weights, .. } = self;
-        fixed.clear();
-        energy.clear();
-        bounds.clear();
-        weights.clear();
-        Room { fixed, energy, bounds, weights }
+    /// Its rows, for the room that they have.
+    pub(super) fn into_rows(self) -> Rows<S, D> {
+        self.rows
+    }
+
+    /// Forms whose squares add up to 2V of a rate.
+    pub(super) fn energy(&self) -> &[Moving<f64, S, D>] {
+        &self.rows.energy
     }
 
     /// The rates while what is constant has the values in z.
     pub(super) fn rates(&self, z: &[f64; N]) -> Rates<f64, S, D> {
         let mut rates = self.rates;
-        for &(number, place, weight) in &self.fixed {
+        for &(number, place, weight) in &self.rows.fixed {
             let number = usize::from(number);
             let constant = if number < S { &mut rates.s[number].constant } else { &mut rates.d[number - S].1 };
             *constant += weight * z[usize::from(place)];
@@ -318,7 +320,7 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
             constant + rules.tolerance[guard.tolerance]
         };
         let fresh = |index: usize| rules.fresh_order(self.matrices.guards[index].transition.cause);
-        self.bounds.iter().map(move |bound| {
+        self.rows.bounds.iter().map(move |bound| {
             let constant = fixed_part(bound.low);
             // A form that leaves its upper bound is looked at more closely.
             let top = bound.high.map_or(f64::INFINITY, |high| match fresh(high) {
@@ -332,12 +334,12 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
 
     /// True if it has a guard in this slot.
     pub(super) fn has(&self, slot: usize) -> bool {
-        self.bounds.iter().any(|bound| bound.slot == slot)
+        self.rows.bounds.iter().any(|bound| bound.slot == slot)
     }
 
     /// The guards for which these are true, by their slots: the form itself, and its upper bound.
     pub(super) fn open(&self, are_open: impl Fn(usize) -> [bool; 2]) -> impl Iterator<Item = usize> {
-        self.bounds.iter().flat_map(move |bound| {
+        self.rows.bounds.iter().flat_map(move |bound| {
             let [low, high] = are_open(bound.slot);
             [Some(bound.low).filter(|_| low), bound.high.filter(|_| high)].into_iter().flatten()
         })
@@ -346,13 +348,13 @@ impl<const N: usize, const S: usize, const D: usize> Law<N, S, D> {
     /// The slot of a guard: 1 if it is the form there, −1 if it is what is left of the upper bound.
     pub(super) fn slot(&self, index: usize) -> (usize, f64) {
         let of = |bound: &&Bound<S, D>| bound.low == index || bound.high == Some(index);
-        let bound = self.bounds.iter().find(of).expect("every guard has a slot");
+        let bound = self.rows.bounds.iter().find(of).expect("every guard has a slot");
         (bound.slot, if bound.low == index { 1.0 } else { -1.0 })
     }
 
     /// The moving weights of a guard.
     pub(super) fn weights(&self, index: usize) -> &Moving<f64, S, D> {
-        &self.weights[index]
+        &self.rows.weights[index]
     }
 }
 

@@ -40,7 +40,7 @@ use crate::solve::polynomial::Polynomial;
 use crate::solve::propagator::SERIES_TERMS;
 use crate::solve::{Ending, Grid, Outcome, check, roots};
 use flight::{Flight, Moving, Width, numbers};
-use law::{Law, Parts, Plan, ReadingSlot, Readings, Room, Slots, all_slide, reads_alike};
+use law::{Law, Parts, Plan, ReadingSlot, Readings, Rows, Slots, all_slide, reads_alike};
 use part::{INNER, Part, TERMS};
 use peak::{Later, Start};
 use std::cell::RefCell;
@@ -197,7 +197,7 @@ struct Fleet<'a, 'j, const N: usize, const S: usize, const D: usize> {
     columns: Columns<S, D>,
     /// Room of runs that have ended, and of laws of machines that have.
     spare: Vec<(Vec<Start<S, D>>, Vec<Later>)>,
-    rooms: Vec<Room<S, D>>,
+    rows: Vec<Rows<S, D>>,
 }
 
 /// The series of one lane.
@@ -220,7 +220,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
             watched: [(f64::INFINITY, 0.0); LANES],
             columns: [Moving::all(0.0); TERMS],
             spare: Vec::with_capacity(LANES),
-            rooms: Vec::new(),
+            rows: Vec::new(),
         };
         (0..LANES).for_each(|lane| fleet.load(lane));
         while fleet.seats.iter().any(Option::is_some) {
@@ -284,7 +284,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
     /// Begins the next run of a machine; false if there is none, or none for lanes.
     fn begin(&mut self, lane: usize, mut kept: Kept<N, S, D>, mut next: Vec<RunOf<'a>>) -> bool {
         let Some((experiment, watcher)) = next.pop() else {
-            self.rooms.extend(kept.laws.into_iter().map(Law::room));
+            self.rows.extend(kept.laws.into_iter().map(Law::into_rows));
             return false;
         };
         let start = experiment.start(&kept.mechanism);
@@ -417,7 +417,7 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
     /// Sets the numbers of the present mode in a lane; false if a quantity is bounded by no spring of it.
     #[inline(never)]
     fn take_up(&mut self, lane: usize) -> bool {
-        let Self { seats, plan, slots, flight, rooms, .. } = self;
+        let Self { seats, plan, slots, flight, rows, .. } = self;
         let Some(seat) = &mut seats[lane] else { return true };
         let Seat { core, kept, watcher, law: present, reads, .. } = &mut **seat;
         let laws = &mut kept.laws;
@@ -433,17 +433,16 @@ impl<'a, 'j, const N: usize, const S: usize, const D: usize> Fleet<'a, 'j, N, S,
                         Arc::new(own)
                     }
                 };
-                let room = rooms.pop().unwrap_or_else(Room::new);
-                laws.push(Law::new(core, readings, plan, slots, room));
+                laws.push(Law::new(core, readings, plan, slots, rows.pop().unwrap_or_default()));
                 laws.len() - 1
             }
         };
         let law = &laws[number];
         if *present != Some(number) {
-            flight.make_room(0, law.readings.slots(), law.energy.len());
+            flight.make_room(0, law.readings.slots(), law.energy().len());
             flight.rates.put(lane, &law.rates(&core.z));
             let none = Moving::all(0.0);
-            let energy = law.energy.iter().chain(std::iter::repeat(&none));
+            let energy = law.energy().iter().chain(std::iter::repeat(&none));
             flight.energy.iter_mut().zip(energy).for_each(|(own, form)| own.put(lane, form));
             if !std::mem::replace(reads, kept.readings.is_some()) {
                 for (slot, own) in flight.quantities.iter_mut().enumerate().take(law.readings.slots()) {
