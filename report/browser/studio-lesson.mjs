@@ -443,6 +443,22 @@ await test("the case text is completed and explained by the schema", async open 
   expect(offered.includes("along") && !offered.includes("viscous"), `offered are ${offered}`);
   await page.keyboard.press("Escape");
   expect(!(await hints.isVisible()), "Escape does not close the list");
+  // A list follows its word, and closes where that is out of sight: here in a field of a few lines.
+  await page.keyboard.press("Control+ ");
+  const lists = [];
+  for (const moved of [0, 10, 10]) {
+    await field.evaluate((field, moved) => (field.scrollTop += moved), moved);
+    await settled(page);
+    lists.push((await hints.boundingBox()).y);
+  }
+  expect(lists[1] === lists[0] - 10 && lists[2] === lists[0] - 20, `the list is at ${lists}`);
+  await field.evaluate(field => {
+    field.style.height = "60px";
+    field.scrollTop = 0;
+  });
+  await settled(page);
+  expect(!(await hints.isVisible()), "the list of a word out of sight is open");
+  await field.evaluate(field => field.style.removeProperty("height"));
   // The mouse over a word.
   await go("[belt]");
   const spot = await field.evaluate(field => {
@@ -459,6 +475,9 @@ await test("the case text is completed and explained by the schema", async open 
   await field.evaluate(field => field.setSelectionRange(7, 7));
   await page.keyboard.press("Control+ ");
   const kinds = (await hints.locator("b").allInnerTexts()).join();
+  // The shorter text scrolls the field, which is told two pictures later: the list stays.
+  await settled(page);
+  expect(await hints.isVisible(), "the list closes where the field scrolls by itself");
   expect(kinds === '"axis","h-frame","core-xy","dual-belt"', kinds);
   await page.keyboard.press("ArrowDown");
   await page.keyboard.press("Tab");

@@ -35,7 +35,7 @@ export class Editor {
       },
       onscroll: () => {
         this.scroll();
-        this.close();
+        this.follow();
       },
       onkeydown: event => this.key(event),
       onkeyup: () => this.explain(this.field.selectionStart),
@@ -92,6 +92,7 @@ export class Editor {
     this.field.value = this.app.text;
     this.field.scrollTop = scrollTop;
     if (document.activeElement === this.field) this.field.setSelectionRange(selectionStart, selectionEnd);
+    this.close();
     this.count();
   }
 
@@ -178,12 +179,24 @@ export class Editor {
       ),
     );
     this.list.hidden = false;
-    const {x, y} = this.spot(this.place ? this.place.from : at),
-      tall = this.list.offsetHeight;
-    const room = field.clientHeight - y - this.line;
-    this.list.style.left = `${Math.max(0, Math.min(x, field.clientWidth - this.list.offsetWidth))}px`;
-    this.list.style.top = `${room < tall ? Math.max(0, y - tall) : y + this.line}px`;
+    this.follow();
     this.choose(0);
+  }
+
+  /** Puts the list beside its word, also where the field has scrolled: typing on its last line scrolls it. Closes the
+   * list where the word is out of sight. */
+  follow() {
+    if (this.list.hidden || !this.place) return;
+    const {field, list} = this,
+      {x, y} = this.spot(this.place.from),
+      tall = list.offsetHeight;
+    if (y + this.line <= 0 || y >= field.clientHeight) {
+      this.close();
+      return;
+    }
+    const room = field.clientHeight - y - this.line;
+    list.style.left = `${Math.max(0, Math.min(x, field.clientWidth - list.offsetWidth))}px`;
+    list.style.top = `${room < tall ? Math.max(0, y - tall) : y + this.line}px`;
   }
 
   /** @param {number} k */
