@@ -8,14 +8,13 @@ mod common;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
-use std::sync::Arc;
 use taut::case::Experiment;
 use taut::friction::{Friction, Law, Shape};
 use taut::machine::axis::{CART, DRIVE};
 use taut::machine::{BeltMake, Machine, Travel};
 use taut::mechanism::Shown;
 use taut::signal::{Hold, Signal};
-use taut::solve::{Begun, Bench, Differentiated, Flow, Solver, Variable, simulate, stream};
+use taut::solve::{Bench, Differentiated, Flow, Solver, simulate, stream};
 
 fn pulse() -> Signal {
     Signal::Pulse { value: 5.0, duration: 0.25, at: 0.0 }
@@ -120,26 +119,7 @@ fn general(c: &mut Criterion) {
 /// The derivatives of two columns by ten numbers of the machine, and the run that they belong to.
 fn derivatives(c: &mut Criterion) {
     let (machine, experiment) = (common::table4(), common::experiment(pulse(), 1.0));
-    let changes: [fn(&mut Machine, f64); 10] = [
-        |machine, by| machine.drives[0].motor.resistance *= 1.0 + by,
-        |machine, by| machine.drives[0].motor.torque_constant *= 1.0 + by,
-        |machine, by| machine.drives[0].motor.back_emf_constant *= 1.0 + by,
-        |machine, by| machine.drive_pulley.inertia *= 1.0 + by,
-        |machine, by| machine.idler_pulley.inertia *= 1.0 + by,
-        |machine, by| machine.cart.mass *= 1.0 + by,
-        |machine, by| machine.belt.stiffness[0] *= 1.0 + by,
-        |machine, by| machine.belt.stiffness[1] *= 1.0 + by,
-        |machine, by| machine.belt.stiffness[2] *= 1.0 + by,
-        |machine, by| machine.pulley_radius *= 1.0 + by,
-    ];
-    let variables = changes.map(|change| {
-        Variable::central(1e-5, |by| {
-            let mut machine = machine.clone();
-            change(&mut machine, by);
-            let mechanism = Arc::new(machine.mechanism());
-            Begun { start: mechanism.begun(&experiment.initial), mechanism }
-        })
-    });
+    let variables = common::ten_variables(&machine, &experiment);
     let outputs = [Shown::Position(DRIVE, 1.0), Shown::Position(CART, 1.0)].map(Differentiated::Shown);
     let mut group = c.benchmark_group("derivatives, 5 V pulse, 1 s, 1001 rows");
     group.bench_function("the run alone", |b| b.iter(|| streamed(&machine, &experiment)));

@@ -1,4 +1,4 @@
-//! Eight standard works, each done once to warm up and once to be measured: `cargo xtask counts` has valgrind count the
+//! Nine standard works, each done once to warm up and once to be measured: `cargo xtask counts` has valgrind count the
 //! instructions of the second time, which no load of the machine changes.
 //!
 //! `cargo run --release --package taut --example counts [-- CALLS [WORK]]` times them instead, the best of so many
@@ -11,12 +11,12 @@ use std::hint::black_box;
 use std::time::Instant;
 use taut::case::{Case, Experiment, TEMPLATE};
 use taut::control::{Controller, Loop, Observation, close};
-use taut::machine::axis::DRIVE;
+use taut::machine::axis::{CART, DRIVE};
 use taut::machine::{GearPlay, Machine};
-use taut::mechanism::Mechanism;
+use taut::mechanism::{Mechanism, Shown};
 use taut::signal::profile::{Leg, Limits, Profile};
 use taut::signal::{Hold, Signal};
-use taut::solve::{Course, Detail, Flow, Simulator, Solver, stream, stream_mechanism};
+use taut::solve::{Bench, Course, Detail, Differentiated, Flow, Simulator, Solver, stream, stream_mechanism};
 use taut::sweep::Sweep;
 
 /// A work: its name, and what does it; the number depends on what came out.
@@ -52,11 +52,25 @@ fn works() -> taut::Result<Vec<Work>> {
         ("sweep", sweep()?),
         ("closed-loop", closed()?),
         ("stribeck", run(common::with_stribeck(common::table4()), pulse.clone(), Solver::GENERAL)),
-        ("geared", run(geared(), pulse, Solver::Exact)),
+        ("geared", run(geared(), pulse.clone(), Solver::Exact)),
         ("h-frame", h_frame()?),
         ("stepping", stepping()?),
         ("edges", run(common::table4(), held, Solver::Exact)),
+        ("derivatives", derivatives(pulse)),
     ])
+}
+
+/// The derivatives of two columns of the first work's run by ten numbers of the machine: what a step of a fit computes.
+fn derivatives(experiment: Experiment) -> Box<dyn Fn() -> f64> {
+    let machine = common::table4();
+    let variables = common::ten_variables(&machine, &experiment);
+    let outputs = [Shown::Position(DRIVE, 1.0), Shown::Position(CART, 1.0)].map(Differentiated::Shown);
+    Box::new(move || {
+        let mut bench = Bench::default();
+        bench.mount(&machine).expect("the machine is sound");
+        let slopes = bench.sensitivities(&experiment, &variables, &outputs).expect("the machine is sound");
+        slopes.expect("the machine is linear between events").columns[0][0][1000]
+    })
 }
 
 /// One second, 1001 rows, every column.

@@ -14,6 +14,7 @@ pub mod stability;
 pub mod truths;
 pub mod wrong;
 
+use std::sync::Arc;
 use taut::case::{Case, Experiment};
 use taut::friction::{Friction, Law, Shape};
 use taut::machine::{
@@ -21,7 +22,31 @@ use taut::machine::{
 };
 use taut::mechanism::State;
 use taut::signal::Signal;
-use taut::solve::{Ending, Solution, Solver, simulate};
+use taut::solve::{Begun, Ending, Solution, Solver, Variable, simulate};
+
+/// Ten numbers of an axis, each with the machine as it is when that number alone is another.
+pub fn ten_variables(machine: &Machine, experiment: &Experiment) -> [Variable; 10] {
+    let changes: [fn(&mut Machine, f64); 10] = [
+        |machine, by| machine.drives[0].motor.resistance *= 1.0 + by,
+        |machine, by| machine.drives[0].motor.torque_constant *= 1.0 + by,
+        |machine, by| machine.drives[0].motor.back_emf_constant *= 1.0 + by,
+        |machine, by| machine.drive_pulley.inertia *= 1.0 + by,
+        |machine, by| machine.idler_pulley.inertia *= 1.0 + by,
+        |machine, by| machine.cart.mass *= 1.0 + by,
+        |machine, by| machine.belt.stiffness[0] *= 1.0 + by,
+        |machine, by| machine.belt.stiffness[1] *= 1.0 + by,
+        |machine, by| machine.belt.stiffness[2] *= 1.0 + by,
+        |machine, by| machine.pulley_radius *= 1.0 + by,
+    ];
+    changes.map(|change| {
+        Variable::central(1e-5, |by| {
+            let mut machine = machine.clone();
+            change(&mut machine, by);
+            let mechanism = Arc::new(machine.mechanism());
+            Begun { start: mechanism.begun(&experiment.initial), mechanism }
+        })
+    })
+}
 
 /// A stage with the paper's motor and radius.
 pub fn paper_stage(stiffness: impl Into<Spans>, inertia: f64, pulley: Friction, cart: Friction) -> Machine {

@@ -290,6 +290,14 @@ impl Cause {
     /// drive's limits and for a spring, two for a stepper's field.
     pub(crate) const KINDS: usize = 2 * BODIES + 9 * DRIVES + 3 * SPRINGS;
 
+    /// The body whose motion it concerns; none of gears and other parts.
+    pub(crate) fn body(self) -> Option<usize> {
+        match self {
+            Cause::Stop(body) | Cause::BreakForward(body) | Cause::BreakBackward(body) => Some(body),
+            Cause::GearTorque(_) | Cause::Switch(_) | Cause::Leave(_) => None,
+        }
+    }
+
     /// Index of its condition; forward breakaway shares that of the body, backward breakaway, which may have a very
     /// different size, has its own.
     pub fn kind(self) -> usize {

@@ -45,6 +45,8 @@ pub(crate) struct SlopedStep<const N: usize> {
     step: Matrix<N, N>,
     /// L of each parameter.
     slopes: Vec<Columns<N>>,
+    /// True if nothing moves.
+    is_still: bool,
 }
 
 impl<const N: usize> Matrix<N, N> {
@@ -77,21 +79,30 @@ impl<const N: usize> Matrix<N, N> {
         }
         let (step, before) = steps.split_last().expect("at least one");
         let is_constant = |at: usize| self.column.iter().all(|column| column[at] == 0.0);
-        let slope = |of: &Columns<N>| {
+        let mut moved = Vec::with_capacity(slopes.len());
+        // No closure, since those are not compiled for the vectors of the function that they are in.
+        for of in slopes {
+            let mut columns = Vec::with_capacity(of.0.len());
             if of.0.iter().all(|(at, _)| is_constant(*at)) {
-                let columns = of.0.iter().map(|(at, column)| (*at, powers.constant(&column.map(|c| c * h), before)));
-                return Columns(columns.collect());
+                for (at, column) in &of.0 {
+                    columns.push((*at, powers.constant(&column.map(|c| c * h), before)));
+                }
+                moved.push(Columns(columns));
+                continue;
             }
-            let first = powers.slope(&of.matrix().scaled(h));
-            Columns::new(&before.iter().fold(first, |slope, step| {
+            let mut slope = powers.slope(&of.matrix().scaled(h));
+            for step in before {
                 // L(2h) = 2 L + L P + P L
                 let mut doubled = slope.scaled(2.0);
                 doubled.add(&slope.product(step));
                 doubled.add(&step.product(&slope));
-                doubled
-            }))
-        };
-        SlopedStep { slopes: slopes.iter().map(slope).collect(), step: step.clone() }
+                slope = doubled;
+            }
+            moved.push(Columns::new(&slope));
+        }
+        let slopes = moved;
+        let is_still = step.column == [[0.0; N]; N] && slopes.iter().all(|slope| slope.0.is_empty());
+        SlopedStep { slopes, step: step.clone(), is_still }
     }
 
     #[inline(always)]
@@ -113,35 +124,43 @@ impl<const N: usize> Matrix<N, N> {
         (series, distance, part): (&Series<N>, f64, f64),
         s: &mut [[f64; N]],
     ) {
-        for (j, s) in s.iter_mut().enumerate() {
-            let mut term = *s;
-            // z_{k−1} partᵏ⁻¹, updated in each step
-            let (mut power, d) = (1.0, distance * part);
-            for (k, z) in series.terms[..=series.order].iter().enumerate() {
-                let mut next = self.times(&term);
+        let mut terms = s.to_vec();
+        // z_{k−1} partᵏ⁻¹, updated in each step
+        let (mut power, d) = (1.0, distance * part);
+        for (k, z) in series.terms[..=series.order].iter().enumerate() {
+            let factor = d / (k + 1) as f64;
+            // One term of each parameter after the other: none waits for the one before.
+            for (j, (term, s)) in terms.iter_mut().zip(&mut *s).enumerate() {
+                let mut next = self.times(term);
                 let mut beside = [0.0; N];
                 if let Some(slope) = slopes.get(j) {
                     slope.add_times(z, &mut beside);
                 }
-                let factor = d / (k + 1) as f64;
                 for ((term, next), beside) in term.iter_mut().zip(&mut next).zip(beside) {
                     *term = factor * (*next + power * beside);
                 }
-                power *= part;
-                s.iter_mut().zip(&term).for_each(|(s, term)| *s += term);
+                s.iter_mut().zip(&*term).for_each(|(s, term)| *s += term);
             }
+            power *= part;
         }
     }
 }
 
 impl<const N: usize> SlopedStep<N> {
+    /// S ← S + P S + L z for each of `s`, with z at the beginning of the step; those beyond the last L have no L.
+    pub(crate) fn advance(&self, z: &[f64; N], s: &mut [[f64; N]]) {
+        if !self.is_still {
+            self.move_on(z, s);
+        }
+    }
+
     widest! {
-        /// S ← S + P S + L z for each of `s`, with z at the beginning of the step; those beyond the last L have no L.
-        pub(crate) fn advance(&self, z: &[f64; N], s: &mut [[f64; N]]) = advance_by_any, advance_by_avx2;
+        /// [`SlopedStep::advance`] where something moves.
+        fn move_on(&self, z: &[f64; N], s: &mut [[f64; N]]) = move_on_by_any, move_on_by_avx2;
     }
 
     #[inline(always)]
-    fn advance_by_any(&self, z: &[f64; N], s: &mut [[f64; N]]) {
+    fn move_on_by_any(&self, z: &[f64; N], s: &mut [[f64; N]]) {
         for (j, s) in s.iter_mut().enumerate() {
             let mut change = self.step.times(s);
             if let Some(slope) = self.slopes.get(j) {

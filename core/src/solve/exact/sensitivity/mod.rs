@@ -28,10 +28,13 @@ use crate::solve::propagator::Series;
 use crate::trajectory::Grid;
 use std::sync::Arc;
 pub(super) use tangent::Sloped;
-use tangent::{RelativeMachine, Tangent, Varied, are_alike};
+use tangent::{Families, RelativeMachine, Tangent, Varied, are_alike};
 
 /// A guard whose rate is at most this multiple of its rounding only grazes.
 const GRAZES: f64 = 1e5;
+
+/// Number of rows whose outputs are written together.
+const HELD: usize = 32;
 
 /// Change of a rate, in roundings, that does not count as a jump.
 const NO_JUMP: f64 = 40.0;
@@ -65,6 +68,8 @@ struct Follower<'t, const N: usize> {
     row: u64,
     /// Number of rows output so far.
     rows: u64,
+    /// z and S at the last of them, in the present mode, whose outputs are not written yet.
+    held: Vec<[f64; N]>,
     seen: RelativeMachine,
     /// By variable; `None` for a variable of the input.
     varied: Vec<Option<Varied>>,
@@ -77,6 +82,7 @@ struct Follower<'t, const N: usize> {
     pending: Vec<Later<N>>,
     /// Modes of this machine with their derivatives, and the tangents of this run.
     slopes: Vec<Sloped<N>>,
+    families: Families<N>,
     tangents: Vec<Tangent>,
     /// The number of the present mode among them.
     now: usize,
@@ -130,6 +136,7 @@ impl<'t, const N: usize> Follower<'t, N> {
             grid,
             row,
             rows: 0,
+            held: Vec::new(),
             seen,
             varied,
             places,
@@ -137,6 +144,7 @@ impl<'t, const N: usize> Follower<'t, N> {
             inputs: Pieces::held(&[0.0; DRIVES], 0.0, f64::INFINITY),
             pending: Vec::new(),
             slopes,
+            families: Families::new(),
             tangents: Vec::new(),
             now,
             series,
@@ -163,6 +171,7 @@ impl<'t, const N: usize> Follower<'t, N> {
         // After a last, shorter interval the run is at the last row, too.
         self.go_to(self.grid.intervals());
         self.put_out();
+        self.write();
         Some(())
     }
 
@@ -249,20 +258,29 @@ impl<'t, const N: usize> Follower<'t, N> {
         if self.core.common.rules.trouble.is_some() {
             return None;
         }
-        let law = &self.core.matrices;
-        let is_of = |tangent: &Tangent| Arc::ptr_eq(&self.slopes[tangent.sloped].law, law);
-        if !self.tangents.get(self.now).is_some_and(is_of) {
-            self.now = match self.tangents.iter().position(is_of) {
-                Some(known) => known,
-                None => {
-                    let changes = self.varied.iter().flatten().filter(|varied| !varied.is_start).collect::<Vec<_>>();
-                    let sloped = Sloped::from_known(&mut self.slopes, law, &self.seen, &changes)?;
-                    let (seen, varied) = (&self.seen, &self.varied);
-                    self.tangents.push(Tangent::new::<N>(sloped, &law.mode, seen, varied, self.task.outputs)?);
-                    self.tangents.len() - 1
-                }
-            };
+        let law = Arc::clone(&self.core.matrices);
+        let of = |tangent: &Tangent| Arc::ptr_eq(&self.slopes[tangent.sloped].law, &law);
+        if self.tangents.get(self.now).is_some_and(of) {
+            return Some(());
         }
+        let known = self.tangents.iter().position(of);
+        self.write();
+        self.now = match known {
+            Some(known) => known,
+            None => {
+                let bodies = self.families.of(&law.mode, &self.seen, &self.varied, self.task.outputs)?;
+                let changes = self.varied.iter().flatten().filter(|varied| !varied.is_start).collect::<Vec<_>>();
+                let sloped = match Sloped::find(&self.slopes, &law, &changes) {
+                    Some(known) => known,
+                    None => {
+                        self.slopes.push(Sloped::new(&law, &self.varied, &bodies)?);
+                        self.slopes.len() - 1
+                    }
+                };
+                self.tangents.push(Tangent::new(sloped, self.task.outputs, &bodies));
+                self.tangents.len() - 1
+            }
+        };
         Some(())
     }
 
@@ -378,21 +396,33 @@ impl<'t, const N: usize> Follower<'t, N> {
 
     /// Puts out the present row, once.
     fn put_out(&mut self) {
-        let row = self.rows as usize;
         if self.rows == self.row {
             self.rows += 1;
-            let (tangent, z) = (&self.tangents[self.now], &self.core.z);
-            for (i, form) in tangent.outputs.iter().enumerate() {
-                self.out.values[i][row] = form.times(z);
-                for (j, &place) in self.places.iter().enumerate() {
-                    self.out.columns[i][j][row] = form.times(&self.s[place]);
-                }
-            }
-            for (i, j, form) in &tangent.output_slopes {
-                self.out.columns[*i][*j][row] += form.times(z);
+            self.held.push(self.core.z);
+            self.held.extend_from_slice(&self.s);
+            if self.held.len() >= HELD * (1 + self.s.len()) {
+                self.write();
             }
         }
         self.move_seam();
+    }
+
+    /// Writes the outputs of the rows that are held, which are of the present mode.
+    fn write(&mut self) {
+        let Some(tangent) = self.tangents.get(self.now) else { return };
+        let wide = 1 + self.s.len();
+        let rows = self.rows as usize - self.held.len() / wide..self.rows as usize;
+        let held = |place: usize| self.held.chunks_exact(wide).map(move |row| &row[place]);
+        for (i, form) in tangent.outputs.iter().enumerate() {
+            form.add_along(held(0), &mut self.out.values[i][rows.clone()]);
+            for (column, place) in self.out.columns[i].iter_mut().zip(&self.places) {
+                form.add_along(held(1 + place), &mut column[rows.clone()]);
+            }
+        }
+        for (i, j, form) in &tangent.output_slopes {
+            form.add_along(held(0), &mut self.out.columns[*i][*j][rows.clone()]);
+        }
+        self.held.clear();
     }
 }
 

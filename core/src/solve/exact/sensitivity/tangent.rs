@@ -1,12 +1,12 @@
 //! Tangent of a mode: derivatives of its equations, guards and outputs with respect to each variable.
 
 use super::super::ModeMatrices;
-use super::super::matrices::{Space, straight};
+use super::super::matrices::Space;
 use crate::friction::Motion;
-use crate::mechanism::{Form, Mechanism, Mode, Shown, State};
+use crate::mechanism::{BODIES, Cause, Drive, Form, Layout, Mechanism, Mode, Shown, State};
 use crate::solve::coordinates::Coordinates;
 use crate::solve::followed::Differentiated;
-use crate::solve::propagator::{Columns, Matrix, SlopedStep};
+use crate::solve::propagator::{Columns, SlopedStep};
 use std::sync::Arc;
 
 /// Differences up to this multiple of the rounding of their terms count as zero.
@@ -54,12 +54,10 @@ impl Varied {
     }
 
     fn row<const N: usize>(&self, here: &[f64; N], first: &[f64; N], second: &[f64; N]) -> [f64; N] {
+        if here == first && here == second {
+            return [0.0; N];
+        }
         std::array::from_fn(|k| self.slope(here[k], first[k], second[k]))
-    }
-
-    fn rows<const N: usize>(&self, here: &[[f64; N]], first: &[[f64; N]], second: &[[f64; N]]) -> Vec<Sparse> {
-        let rows = here.iter().zip(first).zip(second);
-        rows.map(|((here, first), second)| Sparse::new(self.row(here, first, second))).collect()
     }
 }
 
@@ -75,6 +73,17 @@ impl Sparse {
     #[inline]
     pub(super) fn times<const N: usize>(&self, z: &[f64; N]) -> f64 {
         self.0.iter().fold(0.0, |sum, (place, weight)| sum + weight * z[*place])
+    }
+
+    /// Adds its values of one `z` after the other.
+    pub(super) fn add_along<'z, const N: usize>(
+        &self,
+        z: impl Iterator<Item = &'z [f64; N]> + Clone,
+        values: &mut [f64],
+    ) {
+        for &(place, weight) in &self.0 {
+            values.iter_mut().zip(z.clone()).for_each(|(value, z)| *value += weight * z[place]);
+        }
     }
 }
 
@@ -92,13 +101,8 @@ pub(in crate::solve::exact) struct Sloped<const N: usize> {
 }
 
 impl<const N: usize> Sloped<N> {
-    /// Derivatives of the mode of `law`, known or new; `None` if a variable changes the guards of the mode.
-    pub(super) fn from_known(
-        known: &mut Vec<Self>,
-        law: &Arc<ModeMatrices<N>>,
-        seen: &RelativeMachine,
-        machines: &[&Varied],
-    ) -> Option<usize> {
+    /// Number among the `known` of the derivatives of the mode of `law`, by these variables that change the equations.
+    pub(super) fn find(known: &[Self], law: &Arc<ModeMatrices<N>>, machines: &[&Varied]) -> Option<usize> {
         let same = |(own, weights): &([Arc<Mechanism>; 2], [f64; 3]), varied: &&Varied| {
             let pairs = own.iter().zip(&varied.machines);
             *weights == varied.weights && pairs.into_iter().all(|(a, b)| Arc::ptr_eq(a, b) || a == b)
@@ -108,29 +112,20 @@ impl<const N: usize> Sloped<N> {
                 && known.of.len() == machines.len()
                 && known.of.iter().zip(machines).all(|(own, varied)| same(own, varied))
         };
-        if let Some(index) = known.iter().position(fits) {
-            return Some(index);
-        }
-        known.push(Self::new(law, seen, machines)?);
-        Some(known.len() - 1)
+        known.iter().position(fits)
     }
 
-    fn new(law: &Arc<ModeMatrices<N>>, seen: &RelativeMachine, machines: &[&Varied]) -> Option<Self> {
-        let here = Equated::<N>::new(seen, &law.mode);
-        let (mut slopes, mut guards) = (Vec::new(), Vec::new());
-        for varied in machines {
-            let [first, second] = varied.points.each_ref().map(|point| Equated::<N>::new(point, &law.mode));
-            if first.guards.len() != here.guards.len() || second.guards.len() != here.guards.len() {
-                return None;
-            }
-            let columns = (0..N).map(|column| {
-                let of = |rate: &Matrix<N, N>| std::array::from_fn(|row| rate.at(row, column));
-                (column, varied.row(&of(&here.rate), &of(&first.rate), &of(&second.rate)))
-            });
-            slopes.push(Columns(columns.filter(|(_, column): &(_, [f64; N])| *column != [0.0; N]).collect()));
-            guards.push(varied.rows(&here.guards, &first.guards, &second.guards));
+    /// The derivatives of the mode of `law`, from those of its bodies' motions; `None` if these do not have its guards.
+    pub(super) fn new(law: &Arc<ModeMatrices<N>>, variables: &[Option<Varied>], bodies: &Bodies<N>) -> Option<Self> {
+        let (mut of, mut slopes, mut guards) = (Vec::new(), Vec::new(), Vec::new());
+        let places = bodies.guards(law)?;
+        for (j, varied) in variables.iter().enumerate() {
+            let Some(varied) = varied.as_ref().filter(|varied| !varied.is_start) else { continue };
+            of.push((varied.machines.clone(), varied.weights));
+            slopes.push(bodies.slopes_of_rates(j));
+            let row = |(body, place): &(usize, usize)| bodies.moving(bodies.rows(*body, Some(j))[*place]);
+            guards.push(places.iter().map(|guard| Sparse::new(row(guard))).collect());
         }
-        let of = machines.iter().map(|varied| (varied.machines.clone(), varied.weights)).collect();
         Some(Self { law: Arc::clone(law), of, slopes, guards, steps: Vec::new() })
     }
 
@@ -168,60 +163,213 @@ pub(super) struct Tangent {
 }
 
 impl Tangent {
-    /// Tangent of a mode; `None` if an output is not linear in z.
-    pub(super) fn new<const N: usize>(
-        sloped: usize,
-        mode: &Mode,
-        seen: &RelativeMachine,
-        variables: &[Option<Varied>],
-        outputs: &[Differentiated],
-    ) -> Option<Self> {
-        let rows = |seen: &RelativeMachine| {
-            outputs.iter().map(|output| row::<N>(seen, mode, *output)).collect::<Option<Vec<_>>>()
-        };
-        let here = rows(seen)?;
-        let mut output_slopes = Vec::new();
-        for (j, varied) in variables.iter().enumerate() {
-            let Some(varied) = varied else { continue };
-            let slopes = varied.rows(&here, &rows(&varied.points[0])?, &rows(&varied.points[1])?);
-            let some = slopes.into_iter().enumerate().filter(|(_, slope)| !slope.0.is_empty());
-            output_slopes.extend(some.map(|(i, slope)| (i, j, slope)));
-        }
-        Some(Self { sloped, outputs: here.into_iter().map(Sparse::new).collect(), output_slopes })
+    /// Tangent of a mode, from those of its bodies' motions.
+    pub(super) fn new<const N: usize>(sloped: usize, outputs: &[Differentiated], bodies: &Bodies<N>) -> Self {
+        let all = |of: Option<usize>| (0..outputs.len()).map(move |i| (i, Sparse::new(bodies.output(outputs, i, of))));
+        let slopes = |j| all(Some(j)).filter(|(_, slope)| !slope.0.is_empty()).map(move |(i, slope)| (i, j, slope));
+        let output_slopes = bodies.variables().flat_map(slopes).collect();
+        Self { sloped, outputs: all(None).map(|(_, row)| row).collect(), output_slopes }
     }
 }
 
 /// Number of times that a distance is crossed by series before matrices are computed for it.
 const FEW: u32 = 4;
 
-/// One machine in one mode: A, and the guards as rows of weights.
-struct Equated<const N: usize> {
-    rate: Matrix<N, N>,
-    guards: Vec<[f64; N]>,
+/// Rows of weights of z of one machine in one mode, or their derivatives by a variable: rates of the states in their
+/// order, guards, and outputs. Speeds of stuck bodies, which are zero, count.
+struct Rows<const N: usize> {
+    all: Vec<[f64; N]>,
+    /// Of the guards.
+    causes: Vec<Cause>,
 }
 
-impl<const N: usize> Equated<N> {
-    fn new(seen: &RelativeMachine, mode: &Mode) -> Self {
-        let (equations, rate) = straight::<N>(&seen.mechanism, &seen.space, mode);
-        Self { rate, guards: equations.guards.iter().map(|guard| seen.space.row(&guard.form)).collect() }
+impl<const N: usize> Rows<N> {
+    /// `None` if an output is not linear in z.
+    fn new(seen: &RelativeMachine, mode: &Mode, outputs: &[Differentiated]) -> Option<Self> {
+        let (layout, equations) = (&seen.space.layout, seen.mechanism.equations(*mode));
+        let row = |form: &Form| seen.space.row::<N>(form);
+        let mut all = Vec::with_capacity(layout.states + equations.guards.len() + outputs.len());
+        all.resize(layout.states, [0.0; N]);
+        for body in 0..layout.bodies() {
+            all[layout.speed[body]] = row(&equations.acceleration[body]);
+            all[layout.coordinate[body]] = row(&layout.rate(&seen.mechanism, body));
+        }
+        for (place, rate) in layout.current.iter().zip(&equations.current_rate) {
+            place.iter().for_each(|place| all[*place] = row(rate));
+        }
+        all.extend(equations.guards.iter().map(|guard| row(&guard.form)));
+        for output in outputs {
+            all.push(match *output {
+                Differentiated::Acceleration(body) => all[layout.speed[body]],
+                Differentiated::Shown(shown) => shown_row(seen, mode, shown)?,
+            });
+        }
+        Some(Self { all, causes: equations.guards.iter().map(|guard| guard.transition.cause).collect() })
+    }
+
+    /// Their derivatives by a variable, from those at its points; `None` if it changes the guards.
+    fn slopes(&self, varied: &Varied, [first, second]: [&Self; 2]) -> Option<Self> {
+        let rows = self.all.iter().zip(&first.all).zip(&second.all);
+        let slopes = rows.map(|((here, first), second)| varied.row(here, first, second));
+        let same = first.causes == self.causes && second.causes == self.causes;
+        same.then(|| Self { all: slopes.collect(), causes: Vec::new() })
     }
 }
 
-/// An output as a linear form of z; `None` if it is not linear.
-fn row<const N: usize>(seen: &RelativeMachine, mode: &Mode, output: Differentiated) -> Option<[f64; N]> {
+/// The rows of a machine in a mode in which all bodies have one motion, with their derivatives.
+///
+/// A body's equation depends on its own motion alone, unless a lossy gear is there: the derivatives of any mode are put
+/// together from a few such modes.
+struct Alike<const N: usize> {
+    mode: Mode,
+    rows: Rows<N>,
+    /// By variable; `None` for a variable of the input.
+    slopes: Vec<Option<Rows<N>>>,
+}
+
+/// A mode of a run with the rows of each of its bodies.
+pub(super) struct Bodies<'f, const N: usize> {
+    alike: [&'f Alike<N>; BODIES],
+    layout: &'f Layout,
+    mode: &'f Mode,
+}
+
+/// The derivatives of the modes of a run, by the motion of bodies.
+pub(super) struct Families<const N: usize>(Vec<Alike<N>>);
+
+impl<const N: usize> Families<N> {
+    pub(super) fn new() -> Self {
+        Self(Vec::new())
+    }
+
+    /// The rows of a mode; `None` if an output is not linear in z, or a variable changes the guards.
+    pub(super) fn of<'f>(
+        &'f mut self,
+        mode: &'f Mode,
+        seen: &'f RelativeMachine,
+        variables: &[Option<Varied>],
+        outputs: &[Differentiated],
+    ) -> Option<Bodies<'f, N>> {
+        let (mechanism, layout) = (&seen.mechanism, &seen.space.layout);
+        let loses = mechanism.drives.iter().any(Drive::loses);
+        let mut places = [0; BODIES];
+        for (body, place) in places.iter_mut().enumerate().take(layout.bodies()) {
+            let mut wanted = *mode;
+            if !loses {
+                wanted.motion = [mode.motion[mechanism.leader(body)]; BODIES];
+            }
+            *place = match self.0.iter().position(|alike| alike.mode == wanted) {
+                Some(known) => known,
+                None => {
+                    self.0.push(Alike::new(wanted, seen, variables, outputs)?);
+                    self.0.len() - 1
+                }
+            };
+        }
+        Some(Bodies { alike: places.map(|place| &self.0[place]), layout, mode })
+    }
+}
+
+impl<const N: usize> Alike<N> {
+    fn new(
+        mode: Mode,
+        seen: &RelativeMachine,
+        variables: &[Option<Varied>],
+        outputs: &[Differentiated],
+    ) -> Option<Self> {
+        let rows = Rows::new(seen, &mode, outputs)?;
+        let mut slopes = Vec::with_capacity(variables.len());
+        for varied in variables {
+            slopes.push(match varied {
+                None => None,
+                Some(varied) => {
+                    let [first, second] = varied.points.each_ref().map(|point| Rows::new(point, &mode, outputs));
+                    Some(rows.slopes(varied, [&first?, &second?])?)
+                }
+            });
+        }
+        Some(Self { mode, rows, slopes })
+    }
+}
+
+impl<'f, const N: usize> Bodies<'f, N> {
+    fn is_stuck(&self, body: usize) -> bool {
+        self.mode.motion[body] == Motion::Stuck
+    }
+
+    /// A row without speeds of stuck bodies.
+    fn moving(&self, mut row: [f64; N]) -> [f64; N] {
+        let stuck = (0..self.layout.bodies()).filter(|&body| self.is_stuck(body));
+        stuck.for_each(|body| row[self.layout.speed[body]] = 0.0);
+        row
+    }
+
+    /// The numbers of the variables of machine and start.
+    fn variables(&self) -> impl Iterator<Item = usize> + use<'f, N> {
+        self.alike[0].slopes.iter().enumerate().filter(|(_, slopes)| slopes.is_some()).map(|(j, _)| j)
+    }
+
+    /// The rows of a body, or their derivatives by a variable.
+    fn rows(&self, body: usize, variable: Option<usize>) -> &'f [[f64; N]] {
+        let alike = self.alike[body];
+        let rows = variable.map_or(Some(&alike.rows), |j| alike.slopes[j].as_ref());
+        rows.map_or(&[], |rows| &rows.all)
+    }
+
+    /// A_p
+    fn slopes_of_rates(&self, variable: usize) -> Columns<N> {
+        let mut slope = [[0.0; N]; N];
+        let mut put = |place: usize, body: usize| {
+            let row = self.rows(body, Some(variable))[place];
+            if row != [0.0; N] {
+                slope.iter_mut().zip(self.moving(row)).for_each(|(column, value)| column[place] = value);
+            }
+        };
+        for body in 0..self.layout.bodies() {
+            if !self.is_stuck(body) {
+                put(self.layout.speed[body], body);
+            }
+            put(self.layout.coordinate[body], body);
+        }
+        self.layout.current.iter().flatten().for_each(|place| put(*place, 0));
+        Columns(slope.into_iter().enumerate().filter(|(_, column)| *column != [0.0; N]).collect())
+    }
+
+    /// Where the rows of the guards of a mode are, in their order: a body, and the place among its rows; `None` if its
+    /// motion alone does not have them.
+    fn guards(&self, law: &ModeMatrices<N>) -> Option<Vec<(usize, usize)>> {
+        let causes: Vec<Cause> = law.guards.iter().map(|guard| guard.transition.cause).collect();
+        let of = |(number, cause): (usize, &Cause)| {
+            let body = cause.body().unwrap_or(0);
+            // Both sides of a spring that leaves its bounds have one cause: they are told apart by their order.
+            let before = causes[..number].iter().filter(|other| *other == cause).count();
+            let mut same = self.alike[body].rows.causes.iter().enumerate().filter(|(_, own)| *own == cause);
+            same.nth(before).map(|(number, _)| (body, self.layout.states + number))
+        };
+        causes.iter().enumerate().map(of).collect()
+    }
+
+    /// An output, or its derivative by a variable.
+    fn output(&self, outputs: &[Differentiated], number: usize, variable: Option<usize>) -> [f64; N] {
+        let row = |body| {
+            let rows = self.rows(body, variable);
+            rows[rows.len() - outputs.len() + number]
+        };
+        match outputs[number] {
+            // A stuck body has no acceleration.
+            Differentiated::Acceleration(body) if self.is_stuck(body) => [0.0; N],
+            Differentiated::Acceleration(body) => self.moving(row(body)),
+            Differentiated::Shown(_) => row(0),
+        }
+    }
+}
+
+/// A quantity as a linear form of z; `None` if it is not linear.
+fn shown_row<const N: usize>(seen: &RelativeMachine, mode: &Mode, shown: Shown) -> Option<[f64; N]> {
     let (mechanism, space) = (&seen.mechanism, &seen.space);
     let scaled = |mut row: [f64; N], factor: f64| {
         row.iter_mut().for_each(|weight| *weight *= factor);
         row
-    };
-    let shown = match output {
-        // A stuck body has no acceleration.
-        Differentiated::Acceleration(body) if mode.motion[body] == Motion::Stuck => return Some([0.0; N]),
-        Differentiated::Acceleration(body) => {
-            let (equations, _) = straight::<N>(mechanism, space, mode);
-            return Some(space.row(&equations.acceleration[body]));
-        }
-        Differentiated::Shown(shown) => shown,
     };
     Some(match shown {
         Shown::Position(body, factor) => {
