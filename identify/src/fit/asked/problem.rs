@@ -13,6 +13,7 @@ use crate::parameter::{self, Free};
 use crate::signal::Signal;
 use crate::solve::Bench;
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 /// The variables of a fit, and its logs.
 #[derive(Clone)]
@@ -595,6 +596,7 @@ impl<'a> Problem<'a> {
         let mut first = 0;
         for index in 0..self.runs.len() {
             let (rows, own) = (self.runs[index].rows(), self.runs[index].part);
+            self.simulations += 1;
             if !self.one(&mut bench, index, &stages[own], x, &mut r[first..first + rows]) {
                 return false;
             }
@@ -611,6 +613,7 @@ impl<'a> Problem<'a> {
         for index in 0..self.runs.len() {
             let (rows, own) = (self.runs[index].rows(), self.runs[index].part);
             residuals.resize(rows, 0.0);
+            self.simulations += 1;
             if !self.one(&mut bench, index, &stages[own], x, &mut residuals) || bench.steps() > most {
                 return None;
             }
@@ -653,8 +656,11 @@ impl<'a> Problem<'a> {
             let block = (index, first);
             let out = (&mut jacobian, own.as_deref_mut());
             if !is_exact || !self.exact_block((&mut bench, machine), block, (x, bounds), &columns, out) {
-                if own.is_some_and(|own| !self.one(&mut bench, index, machine, x, own)) {
-                    return None;
+                if let Some(own) = own {
+                    self.simulations += 1;
+                    if !self.one(&mut bench, index, machine, x, own) {
+                        return None;
+                    }
                 }
                 left.push((index, first, columns));
             }
@@ -664,8 +670,8 @@ impl<'a> Problem<'a> {
         Some((jacobian, left))
     }
 
-    /// The columns of `left`, runs with where their residuals begin and the variables that move them, by differences;
-    /// false where a run cannot be computed.
+    /// The columns of `left`, runs with where their residuals begin and the variables that move them, by differences,
+    /// side by side; false where a run cannot be computed.
     fn by_differences(
         &mut self,
         left: &[Left],
@@ -674,45 +680,62 @@ impl<'a> Problem<'a> {
         how: &Differences,
         jacobian: &mut DMatrix<f64>,
     ) -> bool {
-        let mut moved = x.to_vec();
-        let (mut a, mut b) = (vec![0.0; r.len()], vec![0.0; r.len()]);
-        for j in 0..x.len() {
-            if !left.iter().any(|(.., columns)| columns.contains(&j)) {
-                continue;
-            }
-            let step = Step::new(x, bounds, j, how);
-            let points = [Some((step.first, &mut a)), step.second.map(|second| (second, &mut b))];
-            for (to, out) in points.into_iter().flatten() {
-                moved[j] = to;
-                // Runs of one machine share what it has made ready.
-                let (stages, mut bench) = (self.all_simulated(&moved), Bench::default());
-                for &(index, first, ref columns) in left {
-                    let run = &self.runs[index];
-                    let (rows, machine) = (run.rows(), &stages[run.part]);
-                    if columns.contains(&j)
-                        && !self.one(&mut bench, index, machine, &moved, &mut out[first..first + rows])
-                    {
-                        return false;
-                    }
-                }
-            }
-            moved[j] = x[j];
-            for (index, first, _) in left.iter().filter(|(.., columns)| columns.contains(&j)) {
-                for k in *first..first + self.runs[*index].rows() {
-                    jacobian[(k, j)] = step.slope(r[k], a[k], b[k]);
-                }
+        let moves = |j: &usize| left.iter().any(|(.., columns)| columns.contains(j));
+        let all: Vec<usize> = (0..x.len()).filter(moves).collect();
+        let column = |&j: &usize| self.column(j, left, (x, r), &Step::new(x, bounds, j, how));
+        let columns: Vec<_> = all.par_iter().map(column).collect();
+        self.simulations += columns.iter().map(|(simulations, _)| simulations).sum::<u64>();
+        for (j, (_, slopes)) in all.into_iter().zip(columns) {
+            let Some(slopes) = slopes else { return false };
+            for (first, own) in slopes {
+                jacobian.view_mut((first, j), (own.len(), 1)).copy_from_slice(&own);
             }
         }
         true
     }
 
-    fn one(&mut self, bench: &mut Bench, index: usize, machine: &Machine, x: &[f64], out: &mut [f64]) -> bool {
-        if self.is_stopped() {
-            return false;
-        }
-        self.simulations += 1;
-        let extras = self.extras_of(index, x);
-        self.runs[index].residuals(bench, machine, &extras, out)
+    /// The derivatives by variable `j` of those runs that it moves, each with the index of its first residual, and the
+    /// number of simulations; `None` where a run cannot be computed.
+    fn column(
+        &self,
+        j: usize,
+        left: &[Left],
+        (x, r): (&[f64], &[f64]),
+        step: &Step,
+    ) -> (u64, Option<Vec<(usize, Vec<f64>)>>) {
+        let (mut simulations, mut moved) = (0, x.to_vec());
+        let mut at = |to: f64| {
+            moved[j] = to;
+            // Runs of one machine share what it has made ready.
+            let (stages, mut bench) = (self.all_simulated(&moved), Bench::default());
+            let mut shown = Vec::new();
+            for (index, ..) in left.iter().filter(|(.., columns)| columns.contains(&j)) {
+                let run = &self.runs[*index];
+                let mut own = vec![0.0; run.rows()];
+                simulations += 1;
+                if !self.one(&mut bench, *index, &stages[run.part], &moved, &mut own) {
+                    return None;
+                }
+                shown.push(own);
+            }
+            Some(shown)
+        };
+        let both = at(step.first).and_then(|first| Some((first, step.second.map_or(Some(Vec::new()), at)?)));
+        let slopes = both.map(|(first, second)| {
+            let moved = left.iter().filter(|(.., columns)| columns.contains(&j)).map(|(_, first, _)| *first);
+            let own = moved.zip(first).enumerate().map(|(run, (from, first))| {
+                let second = second.get(run);
+                let slope = |k: usize| step.slope(r[from + k], first[k], second.map_or(0.0, |second| second[k]));
+                (from, (0..first.len()).map(slope).collect())
+            });
+            own.collect()
+        });
+        (simulations, slopes)
+    }
+
+    /// The residuals of a run; false where it cannot be computed, or the search is stopped.
+    fn one(&self, bench: &mut Bench, index: usize, machine: &Machine, x: &[f64], out: &mut [f64]) -> bool {
+        !self.is_stopped() && self.runs[index].residuals(bench, machine, &self.extras_of(index, x), out)
     }
 }
 

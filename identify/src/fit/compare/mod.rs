@@ -24,6 +24,7 @@ use crate::fit::trust::scores::together;
 use crate::log::Quantity;
 use crate::machine::Machine;
 use crate::solve::Flow;
+use rayon::prelude::*;
 use std::path::Path;
 
 /// The laws and windows to compare.
@@ -228,9 +229,14 @@ impl Course<'_> {
         }
         if let Some(end) = &end {
             let near = Case { machine: end.machine.clone(), ..case.clone() };
-            for part in 0..self.parts.folds.len() {
-                match self.fold(&near, &plan, part, end.delay) {
-                    Ok(found) => errors.push(found),
+            let fold = |part: usize| self.fold(&near, &plan, part, end.delay);
+            let folds: Vec<_> = (0..self.parts.folds.len()).into_par_iter().map(fold).collect();
+            for found in folds {
+                match found {
+                    Ok((found, work)) => {
+                        self.work.add(&work);
+                        errors.push(found);
+                    }
                     Err(error) => {
                         candidate.failed = Some(error.what);
                         break;
@@ -258,19 +264,16 @@ impl Course<'_> {
         Ok((end, errors.iter().map(|one| (one.quantity, one.rmse)).collect()))
     }
 
-    /// The errors in a part that is not fitted.
+    /// The errors in a part that is not fitted, and the effort.
     fn fold(
-        &mut self,
+        &self,
         case: &Case,
         plan: &Plan,
         part: usize,
         delay: Option<f64>,
-    ) -> Result<Vec<(Quantity, f64, usize)>> {
+    ) -> Result<(Vec<(Quantity, f64, usize)>, Work)> {
         let parts = &self.parts;
-        let effort = Effort::of_part(delay);
-        let (found, work) = errors(case, plan, &parts.folds[part], (parts.is_cut, &effort), self.stop)?;
-        self.work.add(&work);
-        Ok(found)
+        errors(case, plan, &parts.folds[part], (parts.is_cut, &Effort::of_part(delay)), self.stop)
     }
 
     /// The best windows of the piecewise linear laws; `None` if none was tried yet.

@@ -10,7 +10,7 @@ use crate::log::Quantity;
 use crate::machine::{AmplifierMode, Machine, Slide};
 use crate::number::engineering;
 use crate::solve::Bench;
-use std::cell::OnceCell;
+use std::sync::OnceLock;
 
 /// End of the fit without the element.
 pub(super) struct Site<'s, 'a> {
@@ -24,8 +24,8 @@ pub(super) struct Site<'s, 'a> {
     /// True if the fit of a machine of several coordinates ended elsewhere than within the noise, so that elements
     /// begin with the values of the case.
     pub is_anew: bool,
-    fastest: OnceCell<Vec<f64>>,
-    windows: OnceCell<Option<InWindows<'a>>>,
+    fastest: OnceLock<Vec<f64>>,
+    windows: OnceLock<Option<InWindows<'a>>>,
 }
 
 /// The machines on which an element is tried.
@@ -152,7 +152,7 @@ impl<'s, 'a> Site<'s, 'a> {
         let is_anew = !machine.has_one_coordinate() && !is_noise(&found.problem, &found.best);
         let geometry = machine.geometry();
         let slides = geometry.slides.iter().map(|slide| geometry.label(slide.body).key).collect();
-        Self { case, plan, found, machine, slides, is_anew, fastest: OnceCell::new(), windows: OnceCell::new() }
+        Self { case, plan, found, machine, slides, is_anew, fastest: OnceLock::new(), windows: OnceLock::new() }
     }
 
     /// The fit without the element in short windows, in which elements of this fit begin; `None` if it fails.

@@ -43,6 +43,7 @@ use crate::fit::search::starts::{Effort, Searched, is_noise};
 use crate::machine::Machine;
 use extension::{Extended, Extension, Fitted, On, Said, Site};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use tried::{Start, Tried};
 
 /// All elements.
@@ -97,8 +98,17 @@ pub(crate) fn cause(case: &Case, plan: &Plan, found: &Searched, law: Option<&Oth
         let is_settled = best.is_some_and(Tried::leaves_noise);
         // What explains all but noise needs no rival; otherwise those that may end lower are fitted, too. Runs of
         // curved friction take long, and come last.
-        let rival = open.iter().position(|tried| !tried.is_whole() && tried.least() < whole);
+        let is_rival = |tried: &Tried| !tried.is_whole() && tried.least() < whole;
+        let rival = open.iter().position(is_rival);
         if let Some(k) = rival.filter(|_| !is_settled) {
+            if !open[k].is_ahead() {
+                // Those whose turn may come next are fitted beside it.
+                let beside = open
+                    .iter_mut()
+                    .filter(|tried| is_rival(tried) && !tried.is_ahead())
+                    .take(rayon::current_num_threads());
+                Tried::look_ahead(&site, beside.collect());
+            }
             let further = open.remove(k).advanced(&site);
             open.extend(further);
             continue;
@@ -137,19 +147,25 @@ fn begun<'a>(site: &Site<'_, 'a>, is_curved: bool, goal: f64) -> Vec<Tried<'a>> 
     let before = site.found.best.cost;
     let mut ranked: Vec<Tried> = Vec::new();
     let mut noise: Option<f64> = None;
-    for start in starts(site, is_curved) {
-        // Elements that the logs hardly tell from one that leaves noise are fitted, too.
-        if noise.is_some_and(|noise| start.promised > CAUSE_RIVAL * noise) {
-            break;
+    let mut starts = starts(site, is_curved).into_iter().peekable();
+    // Side by side; what follows one that leaves noise may not be needed.
+    let beside = if site.is_anew { rayon::current_num_threads() } else { usize::MAX };
+    let is_near = |tried: &Tried| tried.cost() < CAUSE_NEAR * before;
+    while starts.peek().is_some() {
+        let some: Vec<Start> = starts.by_ref().take(beside).collect();
+        let step = |start: Start| (start.promised, Tried::begun(site, start, goal).filter(is_near));
+        for (promised, tried) in some.into_par_iter().map(step).collect::<Vec<_>>() {
+            // Elements that the logs hardly tell from one that leaves noise are fitted, too.
+            if noise.is_some_and(|noise| promised > CAUSE_RIVAL * noise) {
+                starts.by_ref().for_each(drop);
+                break;
+            }
+            let Some(tried) = tried else { continue };
+            if site.is_anew && tried.is_noise() {
+                noise = noise.or(Some(promised));
+            }
+            ranked.push(tried);
         }
-        let promised = start.promised;
-        let Some(tried) = Tried::begun(site, start, goal).filter(|tried| tried.cost() < CAUSE_NEAR * before) else {
-            continue;
-        };
-        if site.is_anew && tried.is_noise() {
-            noise = noise.or(Some(promised));
-        }
-        ranked.push(tried);
     }
     ranked.sort_by(|a, b| a.cost().total_cmp(&b.cost()));
     let most = (1.0 - CAUSE_EXPLAINS) * before;
@@ -177,8 +193,9 @@ fn starts(site: &Site, is_curved: bool) -> Vec<Start> {
     let is_ranked = !site.machine.has_one_coordinate();
     let rows = EXTENSIONS.iter().filter(|row| row.is_curved == is_curved && row.on.takes(&site.machine));
     let tries = rows.flat_map(|row| (row.tries)(site).into_iter().map(move |extended| (row, extended)));
-    let starts = tries.filter_map(|(row, extended)| Start::new(site, row, extended, is_ranked));
-    let mut starts: Vec<Start> = starts.collect();
+    let tries: Vec<(&Extension, Extended)> = tries.collect();
+    let start = |(row, extended)| Start::new(site, row, extended, is_ranked);
+    let mut starts: Vec<Start> = tries.into_par_iter().filter_map(start).collect();
     if is_ranked {
         starts.sort_by(|a, b| a.promised.total_cmp(&b.promised));
         let mut taken: Vec<Start> = Vec::new();
@@ -262,16 +279,23 @@ impl<'s, 'a> Folds<'s, 'a> {
         if count < 2 {
             return None;
         }
+        let delay = tried.delay();
         let mut gains = Vec::new();
         for k in 0..count {
             let Without { parts: before, means } = &self.sets[set];
+            let without = || match means.get(k) {
+                Some(known) => *known,
+                None => {
+                    let fold = (&before.folds[k], before.is_cut);
+                    self.mean(&self.case, &self.plan, self.site.found.delay(), fold)
+                }
+            };
+            let with = || self.mean(&with, &own, delay, (&parts.folds[k], parts.is_cut));
+            let (without, with) = rayon::join(without, with);
             if means.len() == k {
-                let mean =
-                    self.mean(&self.case, &self.plan, self.site.found.delay(), (&before.folds[k], before.is_cut));
-                self.sets[set].means.push(mean);
+                self.sets[set].means.push(without);
             }
-            let with = self.mean(&with, &own, tried.delay(), (&parts.folds[k], parts.is_cut))?;
-            let without = self.sets[set].means[k]?;
+            let (with, without) = (with?, without?);
             // ln of the ratio, since a part in which a start fails has errors of another magnitude.
             gains.push((without / with).ln());
             if gains.iter().filter(|gain| **gain <= 0.0).count() > 1 {

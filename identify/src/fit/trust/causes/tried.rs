@@ -18,9 +18,11 @@ use crate::fit::trust::uncertainty::Judged;
 use crate::machine::Machine;
 use crate::parameter;
 use crate::solve::Flow;
+use rayon::prelude::*;
 use std::cell::OnceCell;
 
 /// A model with one additional element, and the state of its search.
+#[derive(Clone)]
 pub(super) struct Tried<'a> {
     row: &'static Extension,
     extended: Extended,
@@ -29,6 +31,8 @@ pub(super) struct Tried<'a> {
     /// The fit with fewer free parameters, from whose end this one begins.
     before: Option<Box<Self>>,
     is_whole: bool,
+    /// What [`Tried::advanced`] returns, if known already.
+    ahead: Option<Option<Box<Self>>>,
     promise: OnceCell<f64>,
     judged: OnceCell<Option<Judged>>,
 }
@@ -146,14 +150,30 @@ impl<'a> Tried<'a> {
             best,
             before: None,
             is_whole: false,
+            ahead: None,
             promise: OnceCell::new(),
             judged: OnceCell::new(),
         })
     }
 
+    /// True if what [`Tried::advanced`] returns is known.
+    pub fn is_ahead(&self) -> bool {
+        self.ahead.is_some()
+    }
+
+    /// Continues these fits side by side; each is as it was until [`Tried::advanced`] tells its end.
+    pub fn look_ahead(site: &Site<'_, 'a>, all: Vec<&mut Self>) {
+        let work: Vec<Self> = all.iter().map(|tried| Self::clone(tried)).collect();
+        let ends: Vec<_> = work.into_par_iter().map(|tried| tried.advanced(site).map(Box::new)).collect();
+        all.into_iter().zip(ends).for_each(|(tried, end)| tried.ahead = Some(end));
+    }
+
     /// Continues the fit: to convergence, or, where parameters are free later, to the start of the fit with them, and
     /// then to its end. `None` if the model fails.
     pub fn advanced(mut self, site: &Site<'_, 'a>) -> Option<Self> {
+        if let Some(end) = self.ahead.take() {
+            return end.map(|end| *end);
+        }
         // It is continued with the parameters that are free later only if it explains something by then.
         let most = (1.0 - CAUSE_EXPLAINS) * site.found.best.cost;
         let goal = if self.extended.later.is_empty() { f64::INFINITY } else { most };
