@@ -1,13 +1,16 @@
 //! Exact sensitivities against differences of runs, on random stages with every element.
 
 use crate::common;
+use crate::common::gantries::{self, Lacks};
 use crate::common::random::{Dry, cases, lined};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::TestRunner;
 use std::sync::Arc;
 use taut::case::Experiment;
+use taut::friction::Motion;
 use taut::machine::Machine;
+use taut::mechanism::{BODIES, Cause, Drive, Equations, State};
 use taut::parameter::{self, Free};
 use taut::signal::{Hold, Signal};
 use taut::solve::{Begun, Bench, Detail, Differentiated, Ending, Flow, Sensitivities, Variable};
@@ -285,6 +288,44 @@ fn sensitivities_are_what_differences_tend_to() {
     println!("{stages} stages, {without} without; {compared} of {rows} values");
     assert!(wrong.is_empty(), "{} of {stages}:\n{}", wrong.len(), wrong.join("\n"));
     assert!(10 * without < stages && 10 * compared > 7 * rows, "{without} of {stages}, {compared} of {rows}");
+}
+
+/// Derivatives of a mode are put together from modes in which all bodies move alike.
+#[test]
+fn the_equation_of_a_body_depends_on_its_own_motion_alone() {
+    let mut runner = TestRunner::new(cases(200));
+    let strategy = (lined(Dry::Any), prop::collection::vec(0..3_usize, BODIES));
+    let mut seen = [0; 3];
+    for number in 0..200 {
+        let (axis, picks) = strategy.new_tree(&mut runner).expect("a stage").current();
+        let machine = if number % 2 == 0 { axis } else { gantries::drawn(number, Lacks::Nothing).case.machine };
+        let mechanism = machine.mechanism();
+        if mechanism.drives.iter().any(Drive::loses) {
+            continue;
+        }
+        let motions = [Motion::Forward, Motion::Backward, Motion::Stuck];
+        let mut mode = mechanism.first_mode(&State::default());
+        for body in 0..mechanism.bodies.len() {
+            let pick = picks[mechanism.leader(body)];
+            mode.motion[body] = motions[pick];
+            seen[pick] += 1;
+        }
+        let all = mechanism.equations(mode);
+        let guards = |equations: &Equations, body: usize| {
+            let own =
+                |cause| matches!(cause, Cause::Stop(b) | Cause::BreakForward(b) | Cause::BreakBackward(b) if b == body);
+            let guards = equations.guards.iter().filter(|guard| own(guard.transition.cause));
+            guards.map(|guard| (guard.transition.cause, guard.form)).collect::<Vec<_>>()
+        };
+        for body in 0..mechanism.bodies.len() {
+            let mut alike = mode;
+            alike.motion = [mode.motion[body]; BODIES];
+            let alike = mechanism.equations(alike);
+            assert_eq!(all.acceleration[body], alike.acceleration[body], "{number}: {machine:?}");
+            assert_eq!(guards(&all, body), guards(&alike, body), "{number}: {machine:?}");
+        }
+    }
+    assert!(seen.iter().all(|count| *count > 100), "{seen:?}");
 }
 
 /// A curved law needs the general solver, and friction where there was none makes another machine: no derivatives, and

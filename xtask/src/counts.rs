@@ -1,4 +1,4 @@
-//! `cargo xtask counts [--keep]`: how many instructions eight standard works take, against those that are kept in
+//! `cargo xtask counts [--keep]`: how many instructions nine standard works take, against those that are kept in
 //! `benches/counts.txt`.
 //!
 //! Times depend on what else a machine does; instructions do not. valgrind runs `examples/counts.rs` and counts those

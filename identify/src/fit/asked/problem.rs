@@ -696,13 +696,7 @@ impl<'a> Problem<'a> {
 
     /// The derivatives by variable `j` of those runs that it moves, each with the index of its first residual, and the
     /// number of simulations; `None` where a run cannot be computed.
-    fn column(
-        &self,
-        j: usize,
-        left: &[Left],
-        (x, r): (&[f64], &[f64]),
-        step: &Step,
-    ) -> (u64, Option<Vec<(usize, Vec<f64>)>>) {
+    fn column(&self, j: usize, left: &[Left], (x, r): (&[f64], &[f64]), step: &Step) -> (u64, Option<Vec<Slopes>>) {
         let (mut simulations, mut moved) = (0, x.to_vec());
         let mut at = |to: f64| {
             moved[j] = to;
@@ -751,6 +745,9 @@ fn no_log(machine: &Machine) -> Error {
     Error::new("there is no log to fit")
         .next(format!("add log = {{ file = \"...\", time = \"...\"{columns} }} to an experiment"))
 }
+
+/// Where the residuals of a run begin, and their derivatives by a variable.
+type Slopes = (usize, Vec<f64>);
 
 /// A run, where its residuals begin, and the variables that move them.
 type Left = (usize, usize, Vec<usize>);

@@ -18,7 +18,7 @@ use crate::fit::search::starts::{Effort, Work, search_as_far};
 use crate::fit::trust::found::Fit;
 use crate::fit::trust::held_out::{met, nothing};
 use crate::fit::trust::nearest::search_near;
-use crate::fit::trust::parts::{Parts, errors};
+use crate::fit::trust::parts::{Errors, Parts, errors};
 use crate::fit::trust::result::known;
 use crate::fit::trust::scores::together;
 use crate::log::Quantity;
@@ -202,7 +202,7 @@ struct Course<'a> {
 struct Tried {
     candidate: Candidate,
     /// Sum of squares and number of values, by part and quantity.
-    errors: Vec<Vec<(Quantity, f64, usize)>>,
+    errors: Vec<Errors>,
     training: Vec<(Quantity, f64)>,
     case: Case,
     /// The machine of the case's text, where its search did not begin.
@@ -265,13 +265,7 @@ impl Course<'_> {
     }
 
     /// The errors in a part that is not fitted, and the effort.
-    fn fold(
-        &self,
-        case: &Case,
-        plan: &Plan,
-        part: usize,
-        delay: Option<f64>,
-    ) -> Result<(Vec<(Quantity, f64, usize)>, Work)> {
+    fn fold(&self, case: &Case, plan: &Plan, part: usize, delay: Option<f64>) -> Result<(Errors, Work)> {
         let parts = &self.parts;
         errors(case, plan, &parts.folds[part], (parts.is_cut, &Effort::of_part(delay)), self.stop)
     }
@@ -304,7 +298,7 @@ impl Course<'_> {
                 quantities.push(*quantity);
             }
         }
-        let mean = |errors: &[Vec<(Quantity, f64, usize)>], quantity: Quantity| {
+        let mean = |errors: &[Errors], quantity: Quantity| {
             let own = errors.iter().flatten().filter(|one| one.0 == quantity);
             let (squares, count) = own.fold((0.0, 0), |(s, n), (_, squares, count)| (s + squares, n + count));
             squares / count.max(1) as f64
@@ -319,7 +313,7 @@ impl Course<'_> {
         };
         let shares = quantities.len().max(1) as f64;
         for tried in &mut self.tried {
-            let value = |one: &[Vec<(Quantity, f64, usize)>]| {
+            let value = |one: &[Errors]| {
                 quantities.iter().zip(&units).map(|(quantity, unit)| mean(one, *quantity) / unit).sum::<f64>() / shares
             };
             let candidate = &mut tried.candidate;
