@@ -76,6 +76,21 @@ fn late_stamps_are_a_delay_of_the_other_sign_and_scatter() {
     assert!(named >= 9 && scattered >= 9, "{named} and {scattered} of 10");
 }
 
+/// Elements are tried side by side, and curves differentiated by differences side by side.
+#[test]
+fn a_cause_is_the_same_on_any_number_of_threads() {
+    for (truth, key) in [(Truth::Spring, "spring"), (Truth::LuGre, "lugre")] {
+        let (case, _) = drawn(3, truth);
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| fit(&case, case.fit.as_ref().unwrap(), None, &mut |_| Flow::Continue).unwrap())
+        };
+        let [one, three] = [1, 3].map(on);
+        assert_eq!(one.cause.as_ref().map(|cause| cause.key), Some(key));
+        assert_eq!(format!("{one:?}"), format!("{three:?}"));
+    }
+}
+
 /// A drag of 0.3 b v² made the viscous friction's interval hold in 31 of 100.
 #[test]
 fn a_drag_is_named_with_its_size() {
