@@ -328,6 +328,12 @@ pub(crate) const NOTHING: f64 = 1e-6;
 /// Unit: kinds. Source: speed: two vectors of AVX2. Test: `a_filter_agrees_with_the_covariance_of_its_noise`.
 pub(crate) const BESIDE: usize = 8;
 
+/// Maximum number of residuals of several logs that are computed one after the other; others are computed beside them.
+///
+/// Unit: residuals. Source: chosen: some 2 ms, several times what a machine's modes take. Test:
+/// `logs_beside_each_other_have_the_jacobian_of_each`.
+pub(crate) const ROWS_BESIDE: usize = 2500;
+
 /// Maximum number of blocks into which the values of a quantity are averaged.
 ///
 /// Unit: blocks. Source: speed. Test: `a_long_log_has_a_bounded_number_of_blocks`.

@@ -6,7 +6,7 @@ use super::run::{Extra, FittedLog, LogOptions, MeasuredOutput, Nuisance, roundin
 use super::straight::straightened;
 use crate::case::{Case, Nuisances, Plan, Scope, matches, parameters};
 use crate::error::{Error, Result};
-use crate::fit::limits::{FILE_ROUNDING, KNOWN_DELAY, SENSOR_START, SLOW_BY_DIFFERENCE, STARTS_MOVING};
+use crate::fit::limits::{FILE_ROUNDING, KNOWN_DELAY, ROWS_BESIDE, SENSOR_START, SLOW_BY_DIFFERENCE, STARTS_MOVING};
 use crate::log::Quantity;
 use crate::machine::{AmplifierMode, DriveUnit, Machine};
 use crate::parameter::{self, Free};
@@ -14,6 +14,7 @@ use crate::signal::Signal;
 use crate::solve::Bench;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// The variables of a fit, and its logs.
 #[derive(Clone)]
@@ -589,20 +590,48 @@ impl<'a> Problem<'a> {
         self.runs[..index].iter().map(FittedLog::rows).sum()
     }
 
+    /// Runs that are computed one after the other, and share the modes of machines that are made ready for them: those
+    /// that follow each other and have up to [`ROWS_BESIDE`] residuals together. Groups are computed side by side.
+    fn groups(&self) -> Vec<Range<usize>> {
+        let mut groups: Vec<Range<usize>> = Vec::new();
+        let mut rows = 0;
+        for (index, run) in self.runs.iter().enumerate() {
+            rows += run.rows();
+            match groups.last_mut().filter(|_| rows <= ROWS_BESIDE) {
+                Some(last) => last.end = index + 1,
+                None => {
+                    groups.push(index..index + 1);
+                    rows = run.rows();
+                }
+            }
+        }
+        groups
+    }
+
     /// Residuals of all runs.
     fn residuals(&mut self, x: &[f64], r: &mut [f64]) -> bool {
         let stages = self.all_simulated(x);
-        let mut bench = Bench::default();
-        let mut first = 0;
-        for index in 0..self.runs.len() {
-            let (rows, own) = (self.runs[index].rows(), self.runs[index].part);
-            self.simulations += 1;
-            if !self.one(&mut bench, index, &stages[own], x, &mut r[first..first + rows]) {
-                return false;
-            }
-            first += rows;
+        let (mut rest, mut work) = (r, Vec::new());
+        for runs in self.groups() {
+            let rows = self.runs[runs.clone()].iter().map(FittedLog::rows).sum();
+            let (own, others) = std::mem::take(&mut rest).split_at_mut(rows);
+            rest = others;
+            work.push((runs, own));
         }
-        true
+        let group = |(runs, mut rest): (Range<usize>, &mut [f64])| {
+            let (mut bench, mut simulations) = (Bench::default(), 0);
+            let is_there = runs.into_iter().all(|index| {
+                let run = &self.runs[index];
+                let (own, others) = std::mem::take(&mut rest).split_at_mut(run.rows());
+                rest = others;
+                simulations += 1;
+                self.one(&mut bench, index, &stages[run.part], x, own)
+            });
+            (simulations, is_there)
+        };
+        let done: Vec<(u64, bool)> = work.into_par_iter().map(group).collect();
+        self.simulations += done.iter().map(|(simulations, _)| simulations).sum::<u64>();
+        done.iter().all(|(_, is_there)| *is_there)
     }
 
     /// Steps of the solver for one simulation of all runs; `None` if one cannot be simulated, or if they are more than
@@ -622,12 +651,12 @@ impl<'a> Problem<'a> {
     }
 
     /// The columns of what only shifts the outputs of a run.
-    fn shifts(&self, machine: &Machine, (index, first): (usize, usize), jacobian: &mut DMatrix<f64>) {
+    fn shifts(&self, machine: &Machine, index: usize, jacobian: &mut DMatrix<f64>) {
         let run = &self.runs[index];
         let mut shift = vec![0.0; run.rows()];
         for (j, extra) in self.own_shifts(index, machine) {
             run.shift(machine, &extra, &mut shift);
-            jacobian.view_mut((first, j), (shift.len(), 1)).copy_from_slice(&shift);
+            jacobian.column_mut(j).copy_from_slice(&shift);
         }
     }
 
@@ -640,34 +669,58 @@ impl<'a> Problem<'a> {
         bounds: &Bounds,
         how: &Differences,
     ) -> Option<(DMatrix<f64>, Vec<Left>)> {
-        let mut jacobian = DMatrix::zeros(self.rows(), x.len());
         let stages = self.all_simulated(x);
-        let mut bench = Bench::default();
         let is_exact = !matches!(how, Differences::Coarse(_));
+        let asked = Asked { x, bounds, is_exact, shows: residuals.is_some() };
+        let group = |runs: Range<usize>| {
+            let (mut bench, mut simulations) = (Bench::default(), 0);
+            let one = |index| self.block((&mut bench, &stages), index, &asked, &mut simulations);
+            let blocks: Option<Vec<Block>> = runs.map(one).collect();
+            (simulations, blocks)
+        };
+        let done: Vec<_> = self.groups().into_par_iter().map(group).collect();
+        self.simulations += done.iter().map(|(simulations, _)| simulations).sum::<u64>();
+        let mut jacobian = DMatrix::zeros(self.rows(), x.len());
         let (mut first, mut left) = (0, Vec::new());
-        for index in 0..self.runs.len() {
-            if self.is_stopped() {
-                return None;
+        let blocks: Option<Vec<Vec<Block>>> = done.into_iter().map(|(_, blocks)| blocks).collect();
+        for (index, block) in blocks?.into_iter().flatten().enumerate() {
+            let rows = block.jacobian.nrows();
+            jacobian.rows_mut(first, rows).copy_from(&block.jacobian);
+            if let Some(residuals) = &mut residuals {
+                residuals[first..first + rows].copy_from_slice(&block.residuals);
             }
-            let (machine, rows) = (&stages[self.runs[index].part], self.runs[index].rows());
-            let mut own = residuals.as_mut().map(|residuals| &mut residuals[first..first + rows]);
-            self.shifts(machine, (index, first), &mut jacobian);
-            let columns = self.movers(index, machine, bounds);
-            let block = (index, first);
-            let out = (&mut jacobian, own.as_deref_mut());
-            if !is_exact || !self.exact_block((&mut bench, machine), block, (x, bounds), &columns, out) {
-                if let Some(own) = own {
-                    self.simulations += 1;
-                    if !self.one(&mut bench, index, machine, x, own) {
-                        return None;
-                    }
-                }
-                left.push((index, first, columns));
-            }
+            left.extend(block.left.map(|columns| (index, first, columns)));
             first += rows;
         }
         self.differences = left.len();
         Some((jacobian, left))
+    }
+
+    /// The part of a run; `None` if it cannot be computed.
+    fn block(
+        &self,
+        (bench, stages): (&mut Bench, &[Machine]),
+        index: usize,
+        asked: &Asked,
+        simulations: &mut u64,
+    ) -> Option<Block> {
+        if self.is_stopped() {
+            return None;
+        }
+        let Asked { x, bounds, is_exact, shows } = *asked;
+        let (machine, rows) = (&stages[self.runs[index].part], self.runs[index].rows());
+        let mut jacobian = DMatrix::zeros(rows, x.len());
+        let mut residuals = vec![0.0; if shows { rows } else { 0 }];
+        self.shifts(machine, index, &mut jacobian);
+        let columns = self.movers(index, machine, bounds);
+        let out = (&mut jacobian, shows.then_some(&mut residuals[..]));
+        if is_exact && self.exact_block((bench, machine), index, (x, bounds), &columns, out) {
+            *simulations += 1;
+            return Some(Block { jacobian, residuals, left: None });
+        }
+        *simulations += u64::from(shows);
+        let is_there = !shows || self.one(bench, index, machine, x, &mut residuals);
+        is_there.then_some(Block { jacobian, residuals, left: Some(columns) })
     }
 
     /// The columns of `left`, runs with where their residuals begin and the variables that move them, by differences,
@@ -744,6 +797,23 @@ fn no_log(machine: &Machine) -> Error {
     let columns: String = inputs.chain(angles).map(|key| format!(", {key} = \"...\"")).collect();
     Error::new("there is no log to fit")
         .next(format!("add log = {{ file = \"...\", time = \"...\"{columns} }} to an experiment"))
+}
+
+/// The point at which blocks are computed, if exact derivatives count, and if residuals are wanted.
+struct Asked<'x> {
+    x: &'x [f64],
+    bounds: &'x Bounds,
+    is_exact: bool,
+    shows: bool,
+}
+
+/// The rows of a run.
+struct Block {
+    jacobian: DMatrix<f64>,
+    /// Empty if they are not wanted.
+    residuals: Vec<f64>,
+    /// The variables that move it, if it has no exact derivatives.
+    left: Option<Vec<usize>>,
 }
 
 /// Where the residuals of a run begin, and their derivatives by a variable.
@@ -1008,6 +1078,34 @@ pub(crate) mod tests {
         let before = problem.simulations;
         assert_eq!(problem.steps(&at, 0), None);
         assert_eq!(problem.simulations, before + 1);
+    }
+
+    /// Sixty logs of 102 values are in three groups.
+    #[test]
+    fn logs_beside_each_other_have_the_jacobian_of_each() {
+        let (mut case, plan) = case(false);
+        let one = case.experiments.remove(0);
+        let mut problem_of = |logs: usize| {
+            case.experiments = (0..logs).map(|k| Experiment { name: format!("log {k}"), ..one.clone() }).collect();
+            let mut problem = Problem::new(&case, &plan).unwrap();
+            let (x, bounds, mut residuals) = (problem.start(), problem.bounds(), vec![0.0; problem.rows()]);
+            let jacobian = problem.linearised(&x, &mut residuals, &bounds, &Differences::Central).unwrap();
+            let mut again = vec![0.0; problem.rows()];
+            assert!(problem.evaluate(&x, &mut again) && problem.simulations == 2 * logs as u64);
+            let apart = residuals.iter().zip(&again).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(apart < 1e-9, "{apart:e}");
+            (problem.groups().len(), jacobian, residuals)
+        };
+        let ((alone, of_one, residuals), (groups, all, of_all)) = (problem_of(1), problem_of(60));
+        let rows = residuals.len();
+        assert_eq!([alone, groups], [1, (60 * rows).div_ceil(ROWS_BESIDE / rows * rows)]);
+        assert_eq!(groups, 3);
+        for log in 0..60 {
+            let own = all.view((log * rows, 0), (rows, 1));
+            assert!((own - of_one.columns(0, 1)).amax() < 1e-9 * of_one.column(0).amax(), "{log}");
+            let beside = residuals.iter().zip(&of_all[log * rows..]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            assert!(beside < 1e-9, "{log}: {beside:e}");
+        }
     }
 
     /// A tenth of the motor's force at the greatest input, in proportion to it.

@@ -13,12 +13,12 @@ use nalgebra::DMatrix;
 use std::sync::Arc;
 
 impl Problem<'_> {
-    /// Writes the derivatives of the residuals of run `index`, from row `first` on, to the columns of these variables,
-    /// and the residuals if requested; returns false if there are no exact derivatives.
+    /// Writes the derivatives of the residuals of run `index` to the columns of these variables, and the residuals if
+    /// requested; returns false if there are no exact derivatives.
     pub(crate) fn exact_block(
-        &mut self,
+        &self,
         (bench, machine): (&mut Bench, &Machine),
-        (index, first): (usize, usize),
+        index: usize,
         (x, bounds): (&[f64], &Bounds),
         columns: &[usize],
         (jacobian, residuals): (&mut DMatrix<f64>, Option<&mut [f64]>),
@@ -47,7 +47,6 @@ impl Problem<'_> {
         let variables = all;
         let extras = self.extras_from(index, x, is_moved);
         let Some(mut slopes) = self.runs[index].slopes(bench, machine, &extras, &variables) else { return false };
-        self.simulations += 1;
         let run = &self.runs[index];
         let rows = run.time.len();
         if let Some(residuals) = residuals {
@@ -96,7 +95,7 @@ impl Problem<'_> {
                 for k in 0..rows {
                     // d|y| = ± dy
                     let sign = if seen.absolute && values[k] < 0.0 { -1.0 } else { 1.0 };
-                    column[first + i * rows + k] = sign * seen.weights[k] * slopes[k];
+                    column[i * rows + k] = sign * seen.weights[k] * slopes[k];
                 }
             }
         }
@@ -107,7 +106,7 @@ impl Problem<'_> {
             if let (Some((j, extra)), Some(deviation)) = (own, extra.known)
                 && columns.contains(&j)
             {
-                jacobian[(first + run.seen.len() * rows + at, j)] = extra.unit / deviation;
+                jacobian[(run.seen.len() * rows + at, j)] = extra.unit / deviation;
             }
         }
         true

@@ -32,6 +32,7 @@ use crate::fit::limits::{
 };
 use crate::log::Quantity;
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use series::Series;
 use std::f64::consts::TAU;
 use student::student_share;
@@ -197,7 +198,7 @@ pub(super) fn spreads(
         rest -= estimate.white_part(None);
     }
     rest /= estimates.len().max(1) as f64;
-    estimates.into_iter().filter_map(|estimate| estimate.spread(&rest)).collect()
+    estimates.into_par_iter().filter_map(|estimate| estimate.spread(&rest)).collect()
 }
 
 impl Normal {
