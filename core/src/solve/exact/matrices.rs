@@ -131,7 +131,7 @@ fn at_rest(mechanism: &Mechanism, stuck: &[bool; BODIES]) -> [bool; SPRINGS] {
 }
 
 /// The equations of a mode, and A.
-pub(super) fn straight<const N: usize>(mechanism: &Mechanism, space: &Space, mode: &Mode) -> (Equations, Matrix<N, N>) {
+fn straight<const N: usize>(mechanism: &Mechanism, space: &Space, mode: &Mode) -> (Equations, Matrix<N, N>) {
     let layout = &space.layout;
     let mut equations = mechanism.equations(*mode);
     // Stuck bodies have no speed, and spans between them do not change; removing both from the guards tightens the

@@ -100,9 +100,8 @@ impl<const N: usize> Matrix<N, N> {
             }
             moved.push(Columns::new(&slope));
         }
-        let slopes = moved;
-        let is_still = step.column == [[0.0; N]; N] && slopes.iter().all(|slope| slope.0.is_empty());
-        SlopedStep { slopes, step: step.clone(), is_still }
+        let is_still = step.column == [[0.0; N]; N] && moved.iter().all(|slope| slope.0.is_empty());
+        SlopedStep { slopes: moved, step: step.clone(), is_still }
     }
 
     #[inline(always)]

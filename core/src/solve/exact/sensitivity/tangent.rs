@@ -175,8 +175,8 @@ impl Tangent {
 /// Number of times that a distance is crossed by series before matrices are computed for it.
 const FEW: u32 = 4;
 
-/// Rows of weights of z of one machine in one mode, or their derivatives by a variable: rates of the states in their
-/// order, guards, and outputs. Speeds of stuck bodies, which are zero, count.
+/// Rows of weights of z of one machine in one mode: rates of the states in their order, guards, and outputs. Speeds of
+/// stuck bodies, which are zero, count.
 struct Rows<const N: usize> {
     all: Vec<[f64; N]>,
     /// Of the guards.
@@ -208,11 +208,11 @@ impl<const N: usize> Rows<N> {
     }
 
     /// Their derivatives by a variable, from those at its points; `None` if it changes the guards.
-    fn slopes(&self, varied: &Varied, [first, second]: [&Self; 2]) -> Option<Self> {
+    fn slopes(&self, varied: &Varied, [first, second]: [&Self; 2]) -> Option<Vec<[f64; N]>> {
         let rows = self.all.iter().zip(&first.all).zip(&second.all);
         let slopes = rows.map(|((here, first), second)| varied.row(here, first, second));
         let same = first.causes == self.causes && second.causes == self.causes;
-        same.then(|| Self { all: slopes.collect(), causes: Vec::new() })
+        same.then(|| slopes.collect())
     }
 }
 
@@ -223,8 +223,8 @@ impl<const N: usize> Rows<N> {
 struct Alike<const N: usize> {
     mode: Mode,
     rows: Rows<N>,
-    /// By variable; `None` for a variable of the input.
-    slopes: Vec<Option<Rows<N>>>,
+    /// The derivatives of all rows, by variable; `None` for a variable of the input.
+    slopes: Vec<Option<Vec<[f64; N]>>>,
 }
 
 /// A mode of a run with the rows of each of its bodies.
@@ -312,8 +312,7 @@ impl<'f, const N: usize> Bodies<'f, N> {
     /// The rows of a body, or their derivatives by a variable.
     fn rows(&self, body: usize, variable: Option<usize>) -> &'f [[f64; N]] {
         let alike = self.alike[body];
-        let rows = variable.map_or(Some(&alike.rows), |j| alike.slopes[j].as_ref());
-        rows.map_or(&[], |rows| &rows.all)
+        variable.map_or(&alike.rows.all, |j| alike.slopes[j].as_deref().unwrap_or(&[]))
     }
 
     /// A_p

@@ -151,14 +151,13 @@ fn begun<'a>(site: &Site<'_, 'a>, is_curved: bool, goal: f64) -> Vec<Tried<'a>> 
     // Side by side; what follows one that leaves noise may not be needed.
     let beside = if site.is_anew { rayon::current_num_threads() } else { usize::MAX };
     let is_near = |tried: &Tried| tried.cost() < CAUSE_NEAR * before;
-    while starts.peek().is_some() {
+    'all: while starts.peek().is_some() {
         let some: Vec<Start> = starts.by_ref().take(beside).collect();
         let step = |start: Start| (start.promised, Tried::begun(site, start, goal).filter(is_near));
         for (promised, tried) in some.into_par_iter().map(step).collect::<Vec<_>>() {
             // Elements that the logs hardly tell from one that leaves noise are fitted, too.
             if noise.is_some_and(|noise| promised > CAUSE_RIVAL * noise) {
-                starts.by_ref().for_each(drop);
-                break;
+                break 'all;
             }
             let Some(tried) = tried else { continue };
             if site.is_anew && tried.is_noise() {
