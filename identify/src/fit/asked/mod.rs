@@ -7,6 +7,7 @@ pub(crate) mod problem;
 mod reading;
 pub(crate) mod residuals;
 pub(crate) mod run;
+mod runs;
 mod sensitivity;
 mod sensor_play;
 pub(crate) mod straight;
