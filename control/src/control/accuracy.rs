@@ -76,7 +76,7 @@ impl<'a> Accuracy<'a> {
         controllers.iter_mut().for_each(|controller| controller.reset());
         let mut sampled = Sampled::new(machine, controllers, timing, profiles, false).along(machine, &experiment);
         let error = estimate.finish_driven(&mechanism, &course, solvers, (&run.outcome, flow), &mut |second| {
-            driven(second, &experiment, &mut sampled, |_, _, _| {})
+            driven(second, &experiment, &mut sampled, |_, _, _| Flow::Continue)
         })?;
         // With a controller, a bound that has grown beyond a thousandth of the motion shows that rounding decides events
         // (flanks that rattle, counts that are read differently), but not by how much positions then differ.

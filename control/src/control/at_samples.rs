@@ -13,10 +13,15 @@ use crate::machine::{Machine, SlideAt};
 use crate::mechanism::State;
 use crate::metrics::{Meter, Peak};
 use crate::signal::profile::Profile;
-use crate::solve::{self, Solver};
+use crate::solve::{self, Flow, Solver};
+
+/// Number of samples between two questions whether a run is enough.
+const ASKED: usize = 32;
 
 /// Runs a move and gathers the errors of the slides, settling and RMS currents from samples, interpolated linearly;
-/// returns the figures and the ending. Motion and commands are those of [`closed_loop`](super::closed_loop).
+/// returns the figures and the ending, and the time of the last sample, s. Motion and commands are those of
+/// [`closed_loop`](super::closed_loop). The run stops if `is_enough` says so of the figures so far, each a lower bound
+/// of that of the whole run; these are then returned.
 pub(crate) fn closed_loop_at_samples(
     machine: &Machine,
     controllers: &mut [Standard],
@@ -24,14 +29,33 @@ pub(crate) fn closed_loop_at_samples(
     path: &SampledPath,
     (until, window): (f64, f64),
     solver: Solver,
-) -> Result<(Figures, solve::Ending)> {
+    is_enough: &mut dyn FnMut(&Figures) -> bool,
+) -> Result<AtSamples> {
     timing.check(until)?;
     let experiment = at_rest(machine, path.profiles(), until, timing.every.min(until));
-    let mut gathered = Gathered::new(machine, path, window);
-    let see = |time: f64, state: &State, currents: &[f64]| gathered.see(time, state, currents);
+    let (mut gathered, mut is_cut) = (Gathered::new(machine, path, window), false);
+    let see = |time: f64, state: &State, currents: &[f64]| {
+        gathered.see(time, state, currents);
+        is_cut = gathered.seen % ASKED == 0 && is_enough(&gathered.so_far(until));
+        if is_cut { Flow::Stop } else { Flow::Continue }
+    };
     let run = (machine, &experiment);
     let outcome = unrecorded(run, &mut each(controllers), (timing, path), solver, None::<&mut Meter>, see)?;
-    Ok((gathered.finish(), outcome.ending))
+    let end = gathered.last.unwrap_or_default();
+    Ok(match is_cut {
+        true => AtSamples { figures: gathered.so_far(until), ending: None, end },
+        false => AtSamples { figures: gathered.finish(), ending: Some(outcome.ending), end },
+    })
+}
+
+/// Figures of a move at samples.
+pub(crate) struct AtSamples {
+    /// Figures, of a run that was cut short lower bounds.
+    pub figures: Figures,
+    /// The ending of a run that was not cut short.
+    pub ending: Option<solve::Ending>,
+    /// Time of the last sample, s.
+    pub end: f64,
 }
 
 /// Figures at samples.
@@ -136,11 +160,27 @@ impl<'a> Gathered<'a> {
         (self.last, self.seen) = (Some(time), self.seen + 1);
     }
 
+    /// Figures of the whole run.
     fn finish(self) -> Figures {
         let end = self.last.unwrap_or_default();
         let inside = |slide: &OfSlide| slide.away <= self.window && is_made(slide.profile, self.window, slide.reached);
         let is_inside = end >= self.done && self.slides.iter().all(inside);
-        let entered = self.slides.iter().filter_map(|slide| slide.entered).reduce(f64::max);
+        self.figures(end, is_inside.then(|| self.entered().map_or(0.0, |time| (time - self.done).max(0.0))))
+    }
+
+    /// Lower bounds of the figures of a run until `until`, s.
+    fn so_far(&self, until: f64) -> Figures {
+        let is_outside = self.slides.iter().any(|slide| slide.away > self.window);
+        let outside = if is_outside { self.last } else { self.entered() };
+        self.figures(until, Some(outside.map_or(0.0, |time| (time - self.done).max(0.0))))
+    }
+
+    /// Time of the last entry of a slide into its window, s.
+    fn entered(&self) -> Option<f64> {
+        self.slides.iter().filter_map(|slide| slide.entered).reduce(f64::max)
+    }
+
+    fn figures(&self, end: f64, settling: Option<f64>) -> Figures {
         let load = |slide: &OfSlide| LoadFigures {
             error: Deviation { peak: slide.peak, rms: slide.squared.root(end), last: slide.error },
             overshoot: 0.0,
@@ -151,7 +191,7 @@ impl<'a> Gathered<'a> {
         };
         Figures {
             loads: self.slides.iter().map(load).collect(),
-            settling: is_inside.then(|| entered.map_or(0.0, |time| (time - self.done).max(0.0))),
+            settling,
             drives: self.currents.iter().map(drive).collect(),
             spans: Vec::new(),
             contour: None,

@@ -50,7 +50,7 @@ mod welch;
 mod wide;
 
 pub use accuracy::Accuracy;
-pub(crate) use at_samples::closed_loop_at_samples;
+pub(crate) use at_samples::{AtSamples, closed_loop_at_samples};
 pub use figures::{Deviation, DriveFigures, Figures, LoadFigures};
 pub use outcome::follow;
 pub use outcome::{MoveRun, Rows, Setup, close, closed_loop, each, stream};

@@ -110,7 +110,9 @@ pub(crate) fn closed_loop_briefly(
     let experiment = at_rest(machine, profiles, until, timing.every.min(until));
     let mut gauge = Gauge::new(machine, &experiment, profiles, window).briefly();
     let outcome =
-        unrecorded((machine, &experiment), controllers, (timing, path), solver, Some(&mut gauge), |_, _, _| {})?;
+        unrecorded((machine, &experiment), controllers, (timing, path), solver, Some(&mut gauge), |_, _, _| {
+            Flow::Continue
+        })?;
     Ok((gauge.finish(&outcome.events).0, outcome.ending))
 }
 
@@ -121,7 +123,7 @@ pub(super) fn unrecorded(
     (timing, path): (&Loop, &SampledPath),
     solver: Solver,
     observer: Option<&mut impl Observe>,
-    see: impl FnMut(f64, &State, &[f64]),
+    see: impl FnMut(f64, &State, &[f64]) -> Flow,
 ) -> Result<solve::Outcome> {
     controllers.iter_mut().for_each(|controller| controller.reset());
     let sampled = Sampled::new(machine, controllers, *timing, path.profiles(), false).on(path);
@@ -147,7 +149,7 @@ pub(crate) fn recorded(
     controllers.iter_mut().for_each(|controller| controller.reset());
     let mut sampled = Sampled::new(machine, controllers, *timing, profiles, true).along(machine, &experiment);
     let run = solve::Run::new(machine, &experiment, solver, Detail::Full, None, sink)?;
-    driven(run, &experiment, &mut sampled, |_, _, _| {});
+    driven(run, &experiment, &mut sampled, |_, _, _| Flow::Continue);
     Ok(sampled.kept.unwrap_or_default())
 }
 
@@ -156,7 +158,7 @@ pub(super) fn driven(
     mut run: solve::Run,
     experiment: &Experiment,
     sampled: &mut Sampled,
-    see: impl FnMut(f64, &State, &[f64]),
+    see: impl FnMut(f64, &State, &[f64]) -> Flow,
 ) -> solve::Outcome {
     if sampled.is_open() {
         return run.follow(&experiment.inputs);
@@ -257,7 +259,7 @@ fn run(
     let mut sampled = Sampled::new(machine, controllers, *timing, profiles, keep).along(machine, &experiment);
     let mut gauge = Gauge::new(machine, &experiment, profiles, rows.window);
     let run = solve::Run::reading(read(machine), &experiment, solver, detail, Some(&mut gauge), sink)?;
-    let mut outcome = driven(run, &experiment, &mut sampled, |_, _, _| {});
+    let mut outcome = driven(run, &experiment, &mut sampled, |_, _, _| Flow::Continue);
     // It holds without a controller, which answers to what rounding does.
     let rounding = outcome.error.take();
     let (mut figures, metrics) = gauge.finish(&outcome.events);
@@ -287,7 +289,7 @@ pub fn follow(
     let mut sampled = sampled.exactly().with(added);
     let machine = Machine { encoder: None, ..machine.clone() };
     let mut run = solve::Run::new(&machine, experiment, solver, Detail::Full, None, sink)?;
-    sampled.drive(&mut run, experiment.until, |_, _, _| {});
+    sampled.drive(&mut run, experiment.until, |_, _, _| Flow::Continue);
     Ok(run.finish())
 }
 

@@ -9,7 +9,7 @@ use crate::machine::Machine;
 use crate::mechanism::{DRIVES, State};
 use crate::signal::Signal;
 use crate::signal::profile::Profile;
-use crate::solve::Run;
+use crate::solve::{Flow, Run};
 
 /// Determines the inputs: samples, evaluates the controllers, limits the commands, and applies them after the delay.
 pub(super) struct Sampled<'a, 'c> {
@@ -110,14 +110,16 @@ impl<'a, 'c> Sampled<'a, 'c> {
 
 impl Sampled<'_, '_> {
     /// Drives a run to its end, `until`, s: inputs are held from one decision to the next. `see` is shown time, state
-    /// and the currents of the motors, A, at each of them and at the end.
-    pub(super) fn drive(&mut self, run: &mut Run, until: f64, mut see: impl FnMut(f64, &State, &[f64])) {
+    /// and the currents of the motors, A, at each of them and at the end; it can stop the run.
+    pub(super) fn drive(&mut self, run: &mut Run, until: f64, mut see: impl FnMut(f64, &State, &[f64]) -> Flow) {
         let drives = self.controllers.len();
         loop {
             let state = run.state();
             let mut currents = Commands::default();
             currents.iter_mut().take(drives).enumerate().for_each(|(drive, current)| *current = run.current(drive));
-            see(run.time(), &state, &currents[..drives]);
+            if see(run.time(), &state, &currents[..drives]) == Flow::Stop {
+                return;
+            }
             let (inputs, end) = self.decide(&state, &currents);
             let is_at_end = run.time() >= until;
             if !self.hold(run, &inputs[..drives], end) || is_at_end {

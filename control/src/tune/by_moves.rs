@@ -4,11 +4,11 @@
 use super::edge::Edge;
 use super::evolution::evolve;
 use super::gains::{rounded, shaped};
-use super::objective::{AtWorst, BALANCES, Balance, MoveFigures, Runner, objective};
+use super::objective::{AtWorst, BALANCES, Balance, Glance, MoveFigures, Runner, objective};
 use super::search::{Optimum, minimise_below};
 use super::tried::{Bars, Tried, Weighed};
 use super::watch::Watch;
-use super::work::{FINALISTS, Finalist, Work};
+use super::work::{Finalist, Work};
 use crate::case::{Cost, Move};
 use crate::chance::uniform;
 use crate::control::SampledPath;
@@ -21,12 +21,8 @@ use rand_pcg::rand_core::SeedableRng;
 /// Maximum number of evaluations of a simplex.
 const MOVES: usize = 60;
 
-/// Number of designs of a rough search that are run on all watched machines.
-const ROUGH: usize = 3;
-
-/// Edge of the first simplex, and of later ones.
-const FIRST: f64 = 0.3;
-const FURTHER: f64 = 0.12;
+/// Edge of the simplex.
+const EDGE: f64 = 0.12;
 
 /// Members of differential evolution, and its repetitions with further machines.
 const MEMBERS: usize = 12;
@@ -46,15 +42,12 @@ pub(super) struct Spread {
 pub(super) const WIDE: Spread = Spread { generations: 12, scatter: 0.4, edge: Edge::Beyond(0.0), seed: 15 };
 const NARROW: Spread = Spread { generations: 8, scatter: 0.3, edge: Edge::Eased, seed: 16 };
 
-/// Excess over the limits allowed for the first simplex, which moves along their boundary.
+/// Excess over the limits allowed for the simplex, which moves along their boundary.
 const SLACK: f64 = 0.05;
-
-/// Largest ln J excess over the best at which a finalist is refined.
-const NEAR: f64 = 0.3;
 
 /// Samples of moves that a search of default effort may simulate, plus a fixed charge per evaluated design: a few
 /// processor seconds.
-const SAMPLES: u64 = 6_000_000;
+const SAMPLES: u64 = 4_000_000;
 
 /// Duration of a sample of a stepper, which needs the general solver, relative to that of other machines.
 const OF_STEPPER: f64 = 10.0;
@@ -76,7 +69,7 @@ impl Work<'_> {
     /// Figures of all moves on one machine.
     pub fn looked(&self, runner: &mut Runner, design: &Design, machine: &Machine) -> Result<Vec<MoveFigures>> {
         let one = |(motion, path): (&Move, &SampledPath)| {
-            self.spend(design, motion);
+            self.spend(design, motion.until);
             runner.look(machine, motion, path)
         };
         self.moves.iter().zip(&self.paths).map(one).collect()
@@ -85,37 +78,70 @@ impl Work<'_> {
     /// Figures of each move on all machines, from samples.
     pub fn glanced(&self, design: &Design) -> Result<Vec<Vec<MoveFigures>>> {
         let mut runner = Runner::new(&self.case.machine, design)?;
-        let mut of_move = |(motion, path): (&Move, &SampledPath)| {
-            let one = |machine: &Machine| {
-                self.spend(design, motion);
-                runner.glance(machine, motion, path)
-            };
-            self.stages.iter().map(one).collect::<Result<Vec<_>>>()
+        let mut of_move = |k: usize| {
+            let one = |axis: usize| Ok(self.glanced_at(&mut runner, design, (k, axis), |_| false)?.figures);
+            (0..self.stages.len()).map(one).collect::<Result<Vec<_>>>()
         };
-        self.moves.iter().zip(&self.paths).map(&mut of_move).collect()
+        (0..self.moves.len()).map(&mut of_move).collect()
+    }
+
+    /// Figures of the move of a number on the machine of a number, from samples.
+    fn glanced_at(
+        &self,
+        runner: &mut Runner,
+        design: &Design,
+        (k, axis): (usize, usize),
+        mut is_enough: impl FnMut(&MoveFigures) -> bool,
+    ) -> Result<Glance> {
+        let one = runner.glance(&self.stages[axis], &self.moves[k], &self.paths[k], &mut is_enough)?;
+        self.spend(design, one.end);
+        Ok(one)
     }
 
     /// Worst-case figures of a design on the watched machines, from samples, and ln J by the balance of the search.
-    /// Stops as soon as ln J reaches `bar`, since further machines cannot reduce a worst-case figure.
+    /// Stops as soon as ln J reaches `bar`, since neither further machines nor the rest of a run can reduce a worst-case
+    /// figure.
     pub fn run(&self, design: &Design, watch: &Watch, weighed: &Weighed, bar: f64) -> (Vec<AtWorst>, f64) {
         let nothing = (Vec::new(), f64::INFINITY);
         let Ok(mut runner) = Runner::new(&self.case.machine, design) else { return nothing };
-        let left_out = watch.left_out;
-        let mut seen: Vec<Vec<MoveFigures>> = vec![Vec::new(); self.moves.len()];
+        let mut seen: Vec<Vec<(usize, Glance)>> = vec![Vec::new(); self.moves.len()];
         let mut worst: Vec<AtWorst> = self.least.borrow().iter().map(|&current| AtWorst::at_least(current)).collect();
         let most = watch.axes.iter().map(Vec::len).max().unwrap_or_default();
+        let valued = |worst: &[AtWorst]| self.valued(weighed.cost, &BALANCES[1], worst, weighed.bars);
         let mut value = f64::INFINITY;
         for rank in 0..most {
-            for (k, (motion, path)) in self.moves.iter().zip(&self.paths).enumerate() {
+            for k in 0..self.moves.len() {
                 let Some(&axis) = watch.axes[k].get(rank) else { continue };
-                self.spend(design, motion);
-                let Ok(one) = runner.glance(&self.stages[axis], motion, path) else { return nothing };
-                seen[k].push(one);
-                if seen[k].len() <= left_out && seen[k].len() < watch.axes[k].len() {
+                let so_far = worst[k];
+                // A run ends where its figures alone lose, if they count: which is known once others have been seen.
+                let loses = |least: &MoveFigures| {
+                    worst[k] = so_far.and(least);
+                    valued(&worst) >= bar
+                };
+                let Ok(one) = self.glanced_at(&mut runner, design, (k, axis), loses) else { return nothing };
+                worst[k] = so_far;
+                seen[k].push((axis, one));
+                if seen[k].len() <= watch.left_out && seen[k].len() < watch.axes[k].len() {
                     continue;
                 }
-                worst[k] = AtWorst::new(&seen[k], left_out);
-                value = self.valued(weighed.cost, &BALANCES[1], &worst, weighed.bars);
+                worst[k] = watch.worst(&seen[k]);
+                value = valued(&worst);
+                if value >= bar {
+                    return (worst, value);
+                }
+            }
+        }
+        // A design that does not lose is judged by whole runs.
+        for k in 0..self.moves.len() {
+            for place in 0..seen[k].len() {
+                let (axis, one) = seen[k][place];
+                if one.is_whole {
+                    continue;
+                }
+                let Ok(whole) = self.glanced_at(&mut runner, design, (k, axis), |_| false) else { return nothing };
+                seen[k][place].1 = whole;
+                worst[k] = watch.worst(&seen[k]);
+                value = valued(&worst);
                 if value >= bar {
                     return (worst, value);
                 }
@@ -127,9 +153,9 @@ impl Work<'_> {
         (worst, value)
     }
 
-    /// Searches by moves: roughly with the simplex from each of the best finalists, then with differential evolution
-    /// about the best, then again with the simplex as long as other machines are worst for the result. Returns all
-    /// designs run that keep the limits on the set, and the watched machines.
+    /// Searches by moves: with the simplex from the best design, then with differential evolution about the best, then
+    /// again with the simplex as long as other machines are worst for the result. Returns all designs run that keep
+    /// the limits on the set, and the watched machines.
     pub fn by_moves(&mut self, finalists: &[Finalist], weighed: &Weighed) -> Result<(Vec<Tried>, Watch)> {
         self.grant(1.0);
         let mut watch = Watch::default();
@@ -137,28 +163,19 @@ impl Work<'_> {
         if let Some(first) = finalists.first() {
             self.watched_by(&first.design, &mut watch)?;
         }
-        let mut ranked: Vec<(f64, usize)> = Vec::new();
         for (layout, finalist) in finalists.iter().enumerate() {
+            if (self.stop)() && !archive.is_empty() {
+                return Ok((archive, watch));
+            }
             let (worst, _) = self.run(&finalist.design, &watch, weighed, f64::INFINITY);
-            // The start of a search may be worse in some figure.
-            ranked.push((self.valued(weighed.cost, &BALANCES[1], &worst, None), layout));
             archive.push(Tried { design: finalist.design.clone(), worst, layout, powers: finalist.powers.clone() });
-        }
-        ranked.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let least = ranked.first().map_or(f64::INFINITY, |(value, _)| *value);
-        ranked.retain(|(value, _)| *value <= least + NEAR);
-        if let Some(&(_, layout)) = ranked.first()
-            && !(self.stop)()
-        {
-            let seen = self.glanced(&finalists[layout].design)?;
-            let rough = Watch::roughly(&seen, self.family.left_out(self.stages.len()));
-            for (_, layout) in ranked.into_iter().take(FINALISTS) {
-                archive.extend(self.roughly(finalists, layout, (&rough, &watch), weighed)?);
+            for powers in &finalist.others {
+                let best = archive.iter().map(|tried| self.worth(tried, weighed)).fold(f64::INFINITY, f64::min);
+                self.of_moves((finalist, layout, powers), &watch, weighed, (Edge::Eased, best), &mut archive);
             }
         }
-        for layout in self.nearest(&archive, weighed) {
-            self.onward(finalists, Some(layout), &watch, weighed, &mut archive)?;
-        }
+        self.renewed(&mut archive, &mut watch, weighed)?;
+        self.onward(finalists, None, &watch, weighed, &mut archive)?;
         if let Some(&layout) = self.nearest(&archive, weighed).first() {
             self.evolved(finalists, (layout, WIDE), &watch, weighed, &mut archive)?;
         }
@@ -166,39 +183,29 @@ impl Work<'_> {
             if (self.stop)() || self.is_spent() {
                 break;
             }
-            let Some(design) = self.best_of(&archive, weighed.cost, &BALANCES[1], weighed.bars)? else { break };
-            let layouts = self.nearest(&archive, weighed);
-            if self.watched_by(&design, &mut watch)? {
-                for &layout in &layouts {
-                    self.again(&mut archive, layout, &watch, weighed);
+            match (self.renewed(&mut archive, &mut watch, weighed)?, self.nearest(&archive, weighed).first()) {
+                (Some(true), _) => self.onward(finalists, None, &watch, weighed, &mut archive)?,
+                (Some(false), Some(&layout)) => {
+                    let spread = Spread { seed: NARROW.seed + round as u64, ..NARROW };
+                    self.evolved(finalists, (layout, spread), &watch, weighed, &mut archive)?;
                 }
-                self.onward(finalists, None, &watch, weighed, &mut archive)?;
-            } else if let Some(&layout) = layouts.first() {
-                let spread = Spread { seed: NARROW.seed + round as u64, ..NARROW };
-                self.evolved(finalists, (layout, spread), &watch, weighed, &mut archive)?;
+                _ => break,
             }
         }
         Ok((archive, watch))
     }
 
-    /// Best designs of a simplex along the boundary of the limits on few machines, with their figures on the watched
-    /// ones.
-    fn roughly(
-        &mut self,
-        finalists: &[Finalist],
-        layout: usize,
-        (rough, watch): (&Watch, &Watch),
-        weighed: &Weighed,
-    ) -> Result<Vec<Tried>> {
-        let mut found = Vec::new();
-        let from = &finalists[layout].powers;
-        self.moved(finalists, (layout, from), (rough, FIRST, Edge::Eased), weighed, &mut found)?;
-        found.sort_by(|a, b| self.worth(a, weighed).total_cmp(&self.worth(b, weighed)));
-        found.truncate(ROUGH);
-        for tried in &mut found {
-            tried.worst = self.run(&tried.design, watch, weighed, f64::INFINITY).0;
+    /// Adds the machines that are worst for the best design, and reruns the best designs of the nearest layouts if any
+    /// is new, which is returned; `None` if no design keeps the limits.
+    fn renewed(&mut self, archive: &mut Vec<Tried>, watch: &mut Watch, weighed: &Weighed) -> Result<Option<bool>> {
+        let best = self.best_of(archive, weighed.cost, &BALANCES[1], weighed.bars)?;
+        let Some(design) = best else { return Ok(None) };
+        let layouts = self.nearest(archive, weighed);
+        let is_new = self.watched_by(&design, watch)?;
+        for &layout in layouts.iter().filter(|_| is_new) {
+            self.again(archive, layout, watch, weighed);
         }
-        Ok(found)
+        Ok(Some(is_new))
     }
 
     /// Adds the machines that are worst for a design to the watched ones; true if any is new.
@@ -207,9 +214,9 @@ impl Work<'_> {
         Ok(watch.join(&Watch::new(&seen, self.family.left_out(self.stages.len()))))
     }
 
-    /// Counts the samples of a move.
-    pub fn spend(&self, design: &Design, motion: &Move) {
-        self.spent.set(self.spent.get() + (motion.until / design.every) as u64);
+    /// Counts the samples of a run until `end`, s.
+    pub fn spend(&self, design: &Design, end: f64) {
+        self.spent.set(self.spent.get() + (end / design.every) as u64);
     }
 
     /// Grants a search this many times the budget.
@@ -231,30 +238,6 @@ impl Work<'_> {
     /// Charge of a design: samples that take as long as its limits on the set.
     fn design_costs(&self) -> u64 {
         self.case.controller.as_ref().map_or(0, |design| design.structure.tunable().costs())
-    }
-
-    /// One search with the simplex; returns its value.
-    fn moved(
-        &mut self,
-        finalists: &[Finalist],
-        (layout, from): (usize, &[f64]),
-        (watch, step, edge): (&Watch, f64, Edge),
-        weighed: &Weighed,
-        archive: &mut Vec<Tried>,
-    ) -> Result<f64> {
-        let finalist = &finalists[layout];
-        let mut value =
-            |x: &[f64], bar: f64| self.of_moves((finalist, layout, x), watch, weighed, (edge, bar), archive);
-        let found = minimise_below(from, step, 1e-3, MOVES, &mut value);
-        let (start, own) = (&finalist.start, finalist.own);
-        if edge == Edge::Eased || !self.passes(&rounded(&shaped(start, own, &found.x)))? {
-            return Ok(found.value);
-        }
-        let powers = self.pulled(start, own, from, &found.x)?;
-        let design = rounded(&shaped(start, own, &powers));
-        let (worst, value) = self.run(&design, watch, weighed, f64::INFINITY);
-        archive.push(Tried { design, worst, layout, powers });
-        Ok(value)
     }
 
     /// Differential evolution about the best designs of a layout, repeated if its result exceeds a limit on a machine
@@ -313,8 +296,18 @@ impl Work<'_> {
     ) -> Result<()> {
         let own = archive.iter().filter(|tried| layout.is_none_or(|layout| tried.layout == layout));
         let best = own.min_by(|a, b| self.worth(a, weighed).total_cmp(&self.worth(b, weighed)));
-        if let Some((layout, powers)) = best.map(|tried| (tried.layout, tried.powers.clone())) {
-            self.moved(finalists, (layout, &powers), (watch, FURTHER, Edge::Beyond(SLACK)), weighed, archive)?;
+        let Some((layout, from)) = best.map(|tried| (tried.layout, tried.powers.clone())) else { return Ok(()) };
+        let finalist = &finalists[layout];
+        let mut value = |x: &[f64], bar: f64| {
+            self.of_moves((finalist, layout, x), watch, weighed, (Edge::Beyond(SLACK), bar), archive)
+        };
+        let found = minimise_below(&from, EDGE, 1e-3, MOVES, &mut value);
+        let (start, own) = (&finalist.start, finalist.own);
+        if self.passes(&rounded(&shaped(start, own, &found.x)))? {
+            let powers = self.pulled(start, own, &from, &found.x)?;
+            let design = rounded(&shaped(start, own, &powers));
+            let worst = self.run(&design, watch, weighed, f64::INFINITY).0;
+            archive.push(Tried { design, worst, layout, powers });
         }
         Ok(())
     }
@@ -380,5 +373,56 @@ impl Work<'_> {
             }
         }
         Ok(None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::case::{Case, Tuning};
+    use crate::tune::family::Family;
+    use crate::tune::gains::searched;
+    use std::path::Path;
+
+    /// Runs end as soon as a design loses; that changes neither which designs win nor their figures, and saves samples.
+    #[test]
+    fn runs_that_are_cut_short_lose_as_whole_ones_do() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../stages");
+        for name in ["sollmann-jouaneh/controllers/pid-elastic.toml", "sollmann-jouaneh/controllers/lqi.toml"] {
+            let case = Case::read(folder.join(name)).unwrap();
+            let (design, tuning) = (case.controller.as_ref().unwrap(), Tuning::default());
+            let family = Family::new(&case, &tuning).unwrap();
+            let work = Work::new(&case, &family, &tuning, &case.moves, design, &|| false).unwrap();
+            let weighed = Weighed { cost: Cost::Moves, bars: None };
+            let own = design.filters.len();
+            let mut random = Pcg64::seed_from_u64(4);
+            let powers = vec![0.0; searched(design, own)];
+            let mut scattered = || -> Design {
+                let powers: Vec<f64> = powers.iter().map(|x| x + 0.4 * (2.0 * uniform(&mut random) - 1.0)).collect();
+                shaped(design, own, &powers)
+            };
+            let mut watch = Watch::new(&work.glanced(design).unwrap(), 1);
+            watch.join(&Watch::new(&work.glanced(&scattered()).unwrap(), 1));
+            let of = |design: &Design, bar: f64| {
+                let before = work.spent.get();
+                let (worst, value) = work.run(design, &watch, &weighed, bar);
+                (worst, value, work.spent.get() - before)
+            };
+            let (mut won, mut lost, mut whole_took, mut took) = (0, 0, 0, 0);
+            for _ in 0..12 {
+                let (one, other) = (scattered(), scattered());
+                let bar = of(&one, f64::INFINITY).1;
+                let (worst, value, whole) = of(&other, f64::INFINITY);
+                let (cut_worst, cut, short) = of(&other, bar);
+                assert_eq!(value < bar, cut < bar, "{name}: {value} {cut} {bar}");
+                if value < bar {
+                    assert_eq!((worst, value), (cut_worst, cut), "{name}");
+                    won += 1;
+                } else {
+                    (lost, whole_took, took) = (lost + 1, whole_took + whole, took + short);
+                }
+            }
+            assert!(won >= 2 && lost >= 2 && 10 * took < 9 * whole_took, "{name}: {won} {lost} {took} {whole_took}");
+        }
     }
 }

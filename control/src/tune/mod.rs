@@ -6,6 +6,7 @@
 
 mod ahead;
 mod by_moves;
+mod by_steps;
 mod certificate;
 mod edge;
 mod evolution;

@@ -14,7 +14,7 @@
 
 use crate::case::{Cost, Move};
 use crate::control::{
-    Figures, LoadFigures, Loop, SampledPath, Standard, closed_loop_at_samples, closed_loop_briefly, each,
+    AtSamples, Figures, LoadFigures, Loop, SampledPath, Standard, closed_loop_at_samples, closed_loop_briefly, each,
 };
 use crate::design::Design;
 use crate::error::Result;
@@ -88,19 +88,32 @@ impl Runner {
         Ok(figures_of(&figures, ending, motion))
     }
 
-    /// Figures of a move at samples only, in a third of the time.
-    pub(crate) fn glance(&mut self, machine: &Machine, motion: &Move, path: &SampledPath) -> Result<MoveFigures> {
-        let seen = (motion.until, motion.window);
-        let (figures, ending) = closed_loop_at_samples(
-            machine,
-            &mut self.controllers,
-            &self.timing,
-            path,
-            seen,
-            Solver::for_machine(machine),
-        )?;
-        Ok(figures_of(&figures, ending, motion))
+    /// Figures of a move at samples only, in a third of the time; cut short if `is_enough` says so of lower bounds.
+    pub(crate) fn glance(
+        &mut self,
+        machine: &Machine,
+        motion: &Move,
+        path: &SampledPath,
+        is_enough: &mut dyn FnMut(&MoveFigures) -> bool,
+    ) -> Result<Glance> {
+        let (seen, solver) = ((motion.until, motion.window), Solver::for_machine(machine));
+        let is_enough = &mut |figures: &Figures| is_enough(&figures_of(figures, Ending::Complete, motion));
+        let AtSamples { figures, ending, end } =
+            closed_loop_at_samples(machine, &mut self.controllers, &self.timing, path, seen, solver, is_enough)?;
+        let is_whole = ending.is_some();
+        Ok(Glance { figures: figures_of(&figures, ending.unwrap_or(Ending::Complete), motion), is_whole, end })
     }
+}
+
+/// Figures of a move at samples.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Glance {
+    /// The figures; lower bounds if the run was cut short.
+    pub figures: MoveFigures,
+    /// False if the run was cut short.
+    pub is_whole: bool,
+    /// End of the run, s.
+    pub end: f64,
 }
 
 fn figures_of(figures: &Figures, ending: Ending, motion: &Move) -> MoveFigures {
@@ -149,6 +162,17 @@ impl AtWorst {
     /// Lower bound of all figures with this current, A.
     pub(super) fn at_least(current: f64) -> Self {
         Self { error: (0.0, 0), rms: 0.0, settles: (0.0, true), current, settled: 0, unsettled: 0 }
+    }
+
+    /// At least these figures, too, on a further machine.
+    pub(super) fn and(&self, least: &MoveFigures) -> Self {
+        Self {
+            error: (self.error.0.max(least.error), self.error.1),
+            rms: self.rms.max(least.rms),
+            settles: (self.settles.0.max(least.settles), self.settles.1),
+            current: self.current.max(least.current),
+            ..*self
+        }
     }
 
     /// Time by which S is later than here, s; zero if the cart settles on no machine here, since S then depends on its
@@ -217,7 +241,7 @@ mod tests {
             for motion in &case.moves {
                 let path = path(motion, design);
                 let whole = runner.look(&case.machine, motion, &path).unwrap();
-                let glance = runner.glance(&case.machine, motion, &path).unwrap();
+                let glance = runner.glance(&case.machine, motion, &path, &mut |_| false).unwrap().figures;
                 let told = format!("{name}: {}: {whole:?} {glance:?}", motion.name);
                 assert!(glance.error <= whole.error && glance.error > 0.98 * whole.error, "{told}");
                 assert!((glance.rms / whole.rms - 1.0).abs() < 0.02, "{told}");

@@ -1,6 +1,6 @@
 //! Machines on which a search runs its moves: those that are worst for its designs.
 
-use super::objective::MoveFigures;
+use super::objective::{AtWorst, Glance, MoveFigures};
 
 /// Number of watched machines for each figure, in addition to the excluded ones.
 const WATCHED: usize = 2;
@@ -41,15 +41,9 @@ impl Watch {
         Self { axes: seen.iter().map(of_move).collect(), left_out }
     }
 
-    /// For each figure only the worst-case machine, on which a rough search runs.
-    pub fn roughly(seen: &[Vec<MoveFigures>], left_out: usize) -> Self {
-        let of_move = |seen: &Vec<MoveFigures>| {
-            let mut axes: Vec<usize> =
-                FIGURES.iter().filter_map(|figure| order(seen, *figure).get(left_out).copied()).collect();
-            axes.dedup();
-            axes
-        };
-        Self { axes: seen.iter().map(of_move).collect(), left_out: 0 }
+    /// Worst case of a move over machines that were seen, without the excluded ones.
+    pub fn worst(&self, seen: &[(usize, Glance)]) -> AtWorst {
+        AtWorst::new(&seen.iter().map(|(_, one)| one.figures).collect::<Vec<_>>(), self.left_out)
     }
 
     /// Adds the machines of another list; true if any is new.

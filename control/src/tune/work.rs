@@ -1,6 +1,7 @@
 //! The search: many designs by the response to steps of command and reference within the limits, without runs; the best
 //! of them by moves.
 
+use super::by_steps::WIDENED;
 use super::family::{Family, modes_along};
 use super::gains::{self, rounded, searched, shaped};
 use super::hunting::Observed;
@@ -9,7 +10,6 @@ use super::margins::{Margins, Peaks, Rough};
 use super::objective::path;
 use super::plant::Plant;
 use super::rules::{layouts, starts};
-use super::search::minimise;
 use crate::case::{Case, Move, Tuning};
 use crate::control::SampledPath;
 use crate::control::feedback::Feedback;
@@ -20,14 +20,7 @@ use std::cell::{Cell, RefCell};
 use std::f64::consts::PI;
 
 /// Fraction of the limits for a search on the grid; the rest covers maxima between its points and rounding.
-const WITHIN: f64 = 0.98;
-
-/// Rounds of a search, each with the machine that exceeded a limit in the previous one.
-const ROUNDS: usize = 5;
-
-/// Evaluations of a search without moves, plus a number for each gain.
-const VALUES: usize = 40;
-const MORE: usize = 24;
+pub(super) const WITHIN: f64 = 0.98;
 
 /// Number of designs evaluated by moves as starts of the search.
 pub(super) const FINALISTS: usize = 3;
@@ -82,15 +75,17 @@ pub(super) struct Finalist {
     pub start: Design,
     pub own: usize,
     pub powers: Vec<f64>,
+    /// Powers of other designs of its layout that moves may prefer.
+    pub others: Vec<Vec<f64>>,
     /// ln of the step response cost.
-    value: f64,
+    pub value: f64,
 }
 
 impl Finalist {
     /// A design unchanged, with `own` filters that are not searched.
     pub fn at(design: &Design, own: usize) -> Self {
         let powers = vec![0.0; searched(design, own)];
-        Self { design: design.clone(), start: design.clone(), own, powers, value: f64::INFINITY }
+        Self { design: design.clone(), start: design.clone(), own, powers, others: Vec::new(), value: f64::INFINITY }
     }
 }
 
@@ -182,13 +177,17 @@ impl<'a> Work<'a> {
         self.tried += 1;
         let Ok(feedback) = self.feedback(design) else { return (f64::INFINITY, f64::INFINITY) };
         let (mut most, mut slow) = (0.0_f64, 0.0_f64);
-        for plant in self.set.iter().map(|&place| &self.plants[place]).chain(&self.more) {
+        for plant in self.on_set_plants() {
             let rough = Rough::new(plant, &feedback);
             most = most.max(rough.peaks.excess(self.tuning.sensitivity, self.tuning.complementary));
-            // Responses to steps of command and reference: the first alone could be optimised without a position gain.
             slow = slow.max(rough.disturbance * rough.following);
         }
         ((most / WITHIN - 1.0).max(0.0), slow)
+    }
+
+    /// Frequency responses of the machines on which the limits have to hold, those that joined last first.
+    pub(super) fn on_set_plants(&self) -> impl Iterator<Item = &Plant> {
+        self.more.iter().rev().chain(self.set.iter().rev().map(|&place| &self.plants[place]))
     }
 
     /// Modes excited by a command, each at the middle of its range along the travel, Hz; and the first anti-resonance.
@@ -240,7 +239,7 @@ impl<'a> Work<'a> {
                 }
             }
             if let Some((_, start)) = best {
-                found.extend(self.improved(start, given.filters.len())?);
+                found.push(self.improved(start, given.filters.len())?);
             }
             if (self.stop)() && !found.is_empty() {
                 break;
@@ -254,6 +253,10 @@ impl<'a> Work<'a> {
         }
         found.sort_by(|a, b| a.value.total_cmp(&b.value));
         found.truncate(FINALISTS);
+        let others = found.split_off(WIDENED.min(found.len()));
+        found = found.into_iter().map(|one| self.widened(one)).collect::<Result<_>>()?;
+        found.extend(others);
+        found.sort_by(|a, b| a.value.total_cmp(&b.value));
         found.extend(self.of_file(given, is_given_good)?);
         Ok((found, placed))
     }
@@ -280,7 +283,14 @@ impl<'a> Work<'a> {
                 let design = rounded(&shaped(given, own, &powers));
                 let (beyond, slow) = self.on_set(&design);
                 if beyond == 0.0 && !self.passes(&design)? {
-                    found.push(Finalist { design, start: given.clone(), own, powers, value: slow.ln() });
+                    found.push(Finalist {
+                        design,
+                        start: given.clone(),
+                        own,
+                        powers,
+                        others: Vec::new(),
+                        value: slow.ln(),
+                    });
                     break;
                 }
                 if (self.stop)() {
@@ -302,34 +312,6 @@ impl<'a> Work<'a> {
             factor *= 0.8;
         }
         Ok(None)
-    }
-
-    /// The best design from a start within the limits, by the response to steps of command and reference.
-    fn improved(&mut self, start: Design, own: usize) -> Result<Option<Finalist>> {
-        let count = searched(&start, own);
-        let mut powers = vec![0.0; count];
-        for round in 0..ROUNDS {
-            self.rounds += 1;
-            let values = VALUES + MORE * count;
-            let most = if round == 0 { values } else { values / 2 };
-            let mut value = |x: &[f64]| {
-                if (self.stop)() {
-                    return f64::INFINITY;
-                }
-                let (beyond, slow) = self.on_set(&shaped(&start, own, x));
-                if beyond > 0.5 { 1e3 + beyond.min(1e6) } else { slow.ln() + STEEP * beyond }
-            };
-            powers = minimise(&powers, 0.3, 1e-3, most, &mut value).x;
-            if !self.passes(&rounded(&shaped(&start, own, &powers)))? {
-                break;
-            }
-            if round + 1 == ROUNDS {
-                powers = self.pulled(&start, own, &vec![0.0; count], &powers)?;
-            }
-        }
-        let design = rounded(&shaped(&start, own, &powers));
-        let value = self.on_set(&design).1.ln();
-        Ok(Some(Finalist { design, start, own, powers, value }))
     }
 
     /// Moves from a design that keeps the limits towards one that does not, as far as they allow.
