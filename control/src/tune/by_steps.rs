@@ -17,13 +17,14 @@ use rand_pcg::rand_core::SeedableRng;
 /// Rounds of a search, each with the machine that exceeded a limit in the previous one.
 const ROUNDS: usize = 5;
 
-/// Evaluations of the first simplex, plus a number for each gain.
+/// Edge of the first simplex, its evaluations, plus a number for each gain; half as many in later rounds.
+const FIRST: f64 = 0.3;
 const VALUES: usize = 40;
 const MORE: usize = 24;
 
 /// Number of layouts in which an evolution follows, its members and generations, and the scatter of the members about
 /// the design of the simplex (natural logarithm of gains).
-pub(super) const WIDENED: usize = 2;
+const WIDENED: usize = 2;
 const MEMBERS: usize = 20;
 const GENERATIONS: usize = 60;
 const SCATTER: f64 = 0.7;
@@ -74,21 +75,31 @@ impl Work<'_> {
     /// The best design from a start within the limits, by the simplex.
     pub(super) fn improved(&mut self, start: Design, own: usize) -> Result<Finalist> {
         let count = searched(&start, own);
-        let mut powers = vec![0.0; count];
+        let (from, most) = (vec![0.0; count], VALUES + MORE * count);
+        let powers = self.within_limits((&start, own), (&from, from.clone()), 0.0, FIRST, [most, most / 2])?;
+        self.finalist(start, own, powers)
+    }
+
+    /// Powers at the end of the simplex from `powers`, repeated with machines that exceed a limit until none does, or
+    /// drawn back towards those of `from`, which keep the limits. `most` are the evaluations of the first simplex and
+    /// of further ones.
+    fn within_limits(
+        &mut self,
+        (start, own): (&Design, usize),
+        (from, mut powers): (&[f64], Vec<f64>),
+        lean: f64,
+        edge: f64,
+        most: [usize; 2],
+    ) -> Result<Vec<f64>> {
         for round in 0..ROUNDS {
             self.rounds += 1;
-            let values = VALUES + MORE * count;
-            let most = if round == 0 { values } else { values / 2 };
-            let mut value = |x: &[f64], bar: f64| self.by_steps(&shaped(&start, own, x), 0.0, bar);
-            powers = minimise_below(&powers, 0.3, ACCURACY, most, &mut value).x;
-            if !self.passes(&rounded(&shaped(&start, own, &powers)))? {
-                break;
-            }
-            if round + 1 == ROUNDS {
-                powers = self.pulled(&start, own, &vec![0.0; count], &powers)?;
+            let mut value = |x: &[f64], bar: f64| self.by_steps(&shaped(start, own, x), lean, bar);
+            powers = minimise_below(&powers, edge, ACCURACY, most[round.min(1)], &mut value).x;
+            if !self.passes(&rounded(&shaped(start, own, &powers)))? {
+                return Ok(powers);
             }
         }
-        self.finalist(start, own, powers)
+        self.pulled(start, own, from, &powers)
     }
 
     fn finalist(&mut self, start: Design, own: usize, powers: Vec<f64>) -> Result<Finalist> {
@@ -97,8 +108,14 @@ impl Work<'_> {
         Ok(Finalist { design, start, own, powers, others: Vec::new(), value })
     }
 
+    /// These finalists, the best first, of which the first ones are replaced by what an evolution finds.
+    pub(super) fn widened(&mut self, finalists: Vec<Finalist>) -> Result<Vec<Finalist>> {
+        let one = |(rank, one)| if rank < WIDENED { self.evolved_finalist(one) } else { Ok(one) };
+        finalists.into_iter().enumerate().map(one).collect()
+    }
+
     /// The best design of a finalist's layout by an evolution for each λ; other good ones stay beside it.
-    pub(super) fn widened(&mut self, mut best: Finalist) -> Result<Finalist> {
+    fn evolved_finalist(&mut self, mut best: Finalist) -> Result<Finalist> {
         let (start, own) = (best.start.clone(), best.own);
         for (number, lean) in LEANS.into_iter().enumerate() {
             let (powers, close) = self.evolved_by_steps((&start, own), &best.powers, lean, number as u64)?;
@@ -138,18 +155,8 @@ impl Work<'_> {
             Optimum { value: value(&x, f64::INFINITY), x }
         });
         let members = evolve(members.collect(), GENERATIONS, EVOLVED + number, &mut value);
-        let mut powers = members.into_iter().next().map_or_else(|| from.to_vec(), |best| best.x);
-        for round in 0..ROUNDS {
-            self.rounds += 1;
-            let mut value = |x: &[f64], bar: f64| self.by_steps(&shaped(start, own, x), lean, bar);
-            powers = minimise_below(&powers, EDGE, ACCURACY, FINAL, &mut value).x;
-            if !self.passes(&rounded(&shaped(start, own, &powers)))? {
-                break;
-            }
-            if round + 1 == ROUNDS {
-                powers = self.pulled(start, own, from, &powers)?;
-            }
-        }
+        let best = members.into_iter().next().map_or_else(|| from.to_vec(), |best| best.x);
+        let powers = self.within_limits((start, own), (from, best), lean, EDGE, [FINAL; 2])?;
         let close = spread(&powers, seen);
         Ok((powers, close))
     }

@@ -1,7 +1,6 @@
 //! The search: many designs by the response to steps of command and reference within the limits, without runs; the best
 //! of them by moves.
 
-use super::by_steps::WIDENED;
 use super::family::{Family, modes_along};
 use super::gains::{self, rounded, searched, shaped};
 use super::hunting::Observed;
@@ -253,9 +252,7 @@ impl<'a> Work<'a> {
         }
         found.sort_by(|a, b| a.value.total_cmp(&b.value));
         found.truncate(FINALISTS);
-        let others = found.split_off(WIDENED.min(found.len()));
-        found = found.into_iter().map(|one| self.widened(one)).collect::<Result<_>>()?;
-        found.extend(others);
+        let mut found = self.widened(found)?;
         found.sort_by(|a, b| a.value.total_cmp(&b.value));
         found.extend(self.of_file(given, is_given_good)?);
         Ok((found, placed))
@@ -283,14 +280,8 @@ impl<'a> Work<'a> {
                 let design = rounded(&shaped(given, own, &powers));
                 let (beyond, slow) = self.on_set(&design);
                 if beyond == 0.0 && !self.passes(&design)? {
-                    found.push(Finalist {
-                        design,
-                        start: given.clone(),
-                        own,
-                        powers,
-                        others: Vec::new(),
-                        value: slow.ln(),
-                    });
+                    let value = slow.ln();
+                    found.push(Finalist { design, powers, value, ..Finalist::at(given, own) });
                     break;
                 }
                 if (self.stop)() {
